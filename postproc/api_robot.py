@@ -128,6 +128,9 @@ def diagnose(
     robot: str | None = None,
     output: PathLike | None = None,
     next_poses: PathLike | None = None,
+    payload: float | None = None,
+    pulls: bool = False,
+    validate: PathLike | Sequence[PathLike] = (),
     tool: Sequence[float] | None = None,
     page: PathLike | None = None,
     csv: PathLike | None = None,
@@ -135,7 +138,9 @@ def diagnose(
 ) -> Diagnosed:
     """Find and name what the robot file misses, as ``compensate diagnose`` does.
 
-    data: CSV files; output: the new robot file; next_poses: where a plan of poses goes that distinguish explanations.
+    data: CSV files; output: the new robot file; next_poses: where a plan of poses goes that distinguish explanations;
+    payload [kg]: heaviest weight that it may hang; pulls: whether it may pull; validate: readings that are not
+    diagnosed.
     """
     from postproc.workflows.diagnose import DiagnoseRequest, diagnose_robot
 
@@ -145,6 +150,9 @@ def diagnose(
             robot=robot,
             output=_path(output),
             next_poses=_path(next_poses),
+            payload_kg=payload,
+            pulls=pulls,
+            validate=_paths(validate),
             tool_mm_deg=None if tool is None else _numbers(tool, "tool", (3, 6)),
             page=_path(page),
             csv=_path(csv),

@@ -261,3 +261,33 @@ def test_what_was_run_is_not_run_again(tmp_path):
     path = tmp_path / "runs.jsonl"
     path.write_text('{"key": "single/0/1", "x": 1}\n{"key": "other/0/1"}\n{"key": "single/1')
     assert command.kept_records(path, {"single/0/1", "single/1/1"}) == [{"key": "single/0/1", "x": 1}]
+
+
+@pytest.mark.slow
+def test_a_zero_that_stated_lengths_express_is_their_own():
+    """A robot file that states all lengths and twists, and a zero of A2 that it does not: turning what follows A2 is a
+    shift of A3 and a zero there."""
+    run = next(made(c) for c in cases.cases("single", 60, 1) if c.effects == ("joint_offset",))
+    ((hidden, size),) = run.hidden
+    assert run.oracle.is_own(hidden, size)
+    other = next(made(c) for c in cases.cases("single", 60, 1) if c.effects == ("transmission_error",))
+    ((hidden, size),) = other.hidden
+    assert not other.oracle.is_own(hidden, size)
+    changed = {"verdict": "nothing_missing", "refitted": [{"parameter": "link_geometry.dx3"}]}
+    unchanged = {"verdict": "nothing_missing", "refitted": []}
+    named = {
+        "verdict": "named",
+        "named": [{"effect": "payload", "joints": []}],
+        **{"refitted": changed["refitted"]},
+    }
+    outcomes = [verdicts.outcome_of(run, answer, [[]]) for answer in (changed, unchanged, named)]
+    assert outcomes == ["exact", "missed", "wrong"]
+
+
+@pytest.mark.slow
+def test_what_a_whole_arm_predicts_alike_is_an_equal_rival():
+    """A weight on the flange and first moments of all links: the oracle tells them as little apart as anybody."""
+    case = next(c for c in cases.cases("single", 60, 1) if c.effects == ("payload",))
+    run = made(case)
+    nearest = verdicts.nearest(run, 0, run.readings.value - run.without)[0]
+    assert (nearest.effect, nearest.joint, nearest.margin) == ("link_gravity", "", 0.0)

@@ -238,6 +238,57 @@ def test_what_can_not_be_told_apart_is_planned(compensate, shop, tmp_path, undec
         filled.unlink()
 
 
+def pulled(shop, tmp_path):
+    """The readings of the shop as if their forces had been pulls, 30 degrees off the vertical."""
+    readings = read_measurements(shop / "loads.csv", [(f"A{k}", False) for k in range(1, 7)])
+    wrench = readings.wrench.copy()
+    wrench[:, 0] = 0.5 * np.abs(wrench[:, 2])
+    (tmp_path / "pulled.csv").write_bytes(measurements_csv(replace(readings, wrench=wrench)))
+    return np.linalg.norm(wrench[:, :3], axis=1).max()
+
+
+@pytest.mark.slow
+def test_pulls_are_proposed_where_the_user_can_pull(compensate, shop, tmp_path, undecided, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    largest = pulled(shop, tmp_path)
+    words = ["diagnose", "pulled.csv", "--robot", shop / "shop.yaml"]
+    alone = compensate(*words, "-o", "new.yaml", "--json", "-")
+    assert (alone.json["next_poses"], alone.json["next_poses_file"]) == (None, None)
+    assert "pulls are proposed with --pulls only" in " ".join(compensate(*words).out.split())
+    done = compensate(*words, "--pulls", "-o", "new.yaml", "--json", "-")
+    poses = done.json["next_poses"]
+    forces = np.array([[pose[f"pull_{axis}_n"] for axis in "xyz"] for pose in poses])
+    weights = np.array([pose["load_kg"] for pose in poses])
+    sizes = np.where(weights > 0, 9.80665 * weights, np.linalg.norm(forces, axis=1))
+    np.testing.assert_allclose(sizes, largest, rtol=1e-4)
+    assert (np.count_nonzero(forces, axis=1) <= 1).all(), "along one axis of the robot base each"
+    lines = Path("new.next_poses.csv").read_text().splitlines()
+    header = next(line for line in lines if not line.startswith("#")).split(",")
+    assert {"FX", "FY", "FZ"} & set(header)
+
+
+@pytest.mark.slow
+def test_no_weight_above_the_payload_is_proposed(compensate, shop, tmp_path, undecided, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = ["diagnose", shop / "loads.csv", "--json", "-", "--robot"]
+    hung = np.unique(
+        np.round(np.linalg.norm(read_measurements(shop / "loads.csv", [(f"A{k}", False) for k in range(1, 7)])
+                                .wrench[:, :3], axis=1) / 9.80665, 1)
+    )  # fmt: skip
+    light, heavy = hung[0], hung[-1]
+    between = 0.5 * (light + heavy) if light < heavy else heavy - 1.0
+    free = compensate(*words, shop / "shop.yaml").json["next_poses"]
+    assert max(pose["load_kg"] for pose in free) == pytest.approx(heavy, abs=0.1)
+    for more, robot in ((["--payload", f"{between}"], shop / "shop.yaml"), ([], tmp_path / "rated.yaml")):
+        stated = f"rated_payload: {{value: {between}, unit: kg, source: plate}}\n"
+        (tmp_path / "rated.yaml").write_text((shop / "shop.yaml").read_text() + stated)
+        poses = compensate(*words, robot, *more).json["next_poses"]
+        if light < heavy:
+            assert max(pose["load_kg"] for pose in poses) <= between
+        else:
+            assert poses is None
+
+
 @pytest.mark.slow
 def test_a_plan_has_the_columns_of_the_readings(compensate, shop, tmp_path, undecided, monkeypatch):
     """So that both can be given together once it is filled in."""

@@ -22,6 +22,7 @@ from postproc.diagnosis.candidates import EVERY
 from postproc.diagnosis.decoys import decoys
 from postproc.diagnosis.diagnosis import diagnose
 from postproc.diagnosis.effect_sizes import SURELY, moved, smallest
+from postproc.diagnosis.residual_patterns import READING, SIDE, pattern_words
 from postproc.diagnosis.selection import CHANCE, selected
 from postproc.diagnosis.verdict import MARGIN, OTHER_COURSE, VERDICTS, Evidence, Named
 from postproc.effects import EFFECTS
@@ -36,7 +37,7 @@ from postproc.report.diagnosed import Diagnosed, NextPoses, diagnosed_csv
 from postproc.report.diagnosed_limits import evidence_words
 from postproc.report.diagnosed_picture import BARS, betrayals, diagnosed_picture, roles_of, series
 from postproc.report.diagnosed_terminal import show_diagnosed
-from postproc.report.diagnosed_words import NOUNS, headline, paragraph
+from postproc.report.diagnosed_words import NOUNS, headline, noun, paragraph
 from postproc.robot.description import Mechanism, Quantity, find_robot, load_robot
 from postproc.robot.provenance import GAP
 
@@ -833,3 +834,30 @@ def test_each_fit_is_drawn_once(spring, stale):
     assert series(spring) == ["before", "refitted", "after", "held_out_after"]
     assert series(stale) == ["before", "after", "held_out_after"]
     assert series(doubtful(spring)) == ["before", "explained", "after", "held_out_after"]
+
+
+def test_no_noun_has_an_empty_place(spring):
+    """A weight of the whole arm stands beside no joint."""
+    whole = next(c for c in candidates_of(spring, "link_gravity") if not c.up_to_joint)
+    part = next(c for c in candidates_of(spring, "link_gravity") if c.up_to_joint)
+    (named,) = spring.verdict.named
+    assert noun(replace(named, candidate=whole, joints=())).startswith(
+        "the arm's own weight beyond the joints:"
+    )
+    assert f"up to {part.up_to_joint}:" in noun(replace(named, candidate=part, joints=()))
+
+
+def candidates_of(result, name):
+    search = result.diagnosis.search
+    return [c for c in (*search.linear.candidates, *search.untestable) if c.name == name]
+
+
+def test_words_of_patterns_name_sides_and_readings():
+    residual = np.zeros((9, 3))
+    residual[0], residual[5:] = 9e-3, 1e-3
+    part = np.array([1, 0, 0, 0, 0, 2, 2, 2, 2])
+    words = pattern_words(residual, part, np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]]), SIDE)
+    # the one reading of no side is no part
+    assert words == "1.73 mm at places from below, 0 mm at places from above"
+    rows = pattern_words(residual, part, np.array([[1.0, 3.7], [3.7, 6.3], [6.3, 9.0]]), READING)
+    assert rows == "1.73 mm at readings 7 .. 9, 0 mm at readings 1 .. 3"

@@ -247,6 +247,17 @@ def test_slope_of_a_load_is_the_derivative_of_its_force(name, gravity, arm):
     np.testing.assert_allclose(np.einsum("iin->in", found), slope, atol=3e-8 * scale, rtol=3e-7)
 
 
+@pytest.mark.parametrize("name", of_kind(Load))
+def test_a_load_asks_for_places_without_load_only_if_it_says_so(name):
+    rng = np.random.default_rng(5)
+    joints = kr270().joints
+    load = made(name, joints)
+    values, state = sampled(load, rng), state_of(joints, rng)
+    moved = replace(state, rest=state.rest + rng.uniform(1e-3, 2e-3, state.rest.shape))
+    same = np.array_equal(force_of(load, values, state)[0], force_of(load, values, moved)[0])
+    assert same != load.by_rest
+
+
 def jacobian_of(load, values, state, step=1e-5):
     """(m, m, N) d force_i / d coordinate_k by central differences, and its size."""
     columns = []

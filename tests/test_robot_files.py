@@ -20,7 +20,7 @@ from postproc.base.geometry import vector_from_rotation
 from postproc.model import StiffnessModel
 from postproc.robot.axis_track import nominal_flange
 from postproc.robot.chain import Chain
-from postproc.robot.description import find_robot, load_robot, robot_files
+from postproc.robot.description import check_programmable, find_robot, load_robot, robot_files
 from postproc.robot.geometries import KukaLengths, KukaVariant, SerialArm
 from postproc.robot.inverse import inverse, status_of
 
@@ -557,7 +557,10 @@ URDF_ERRORS = {
         "has two parent joints",
         '<joint name="c"',
     ),
-    "mimic": (URDF.replace('<axis xyz="0 0.6 0.8"/>', '<mimic joint="lift"/>'), "mimics", "<mimic"),
+    "mimic": (URDF.replace('<axis xyz="0 0.6 0.8"/>', '<mimic joint="none"/>'), "mimics 'none', which is",
+              '"elbow" type'),
+    "mimic by nothing": (URDF.replace('<axis xyz="0 0.6 0.8"/>', '<mimic joint="lift" multiplier="x"/>'),
+                         "'x' is not a number", "<mimic"),
     "twice": (URDF.replace('name="w3"', 'name="w2"'), "joint 'w2' is defined twice", '<parent link="l5"'),
     "link twice": (URDF.replace('<link name="l6"/>', '<link name="l5"/>'), "is defined twice", '<joint name="end"'),
     "doctype": ("<!DOCTYPE robot [<!ENTITY a 'b'>]>\n" + URDF.split("\n", 1)[1], "DOCTYPE", "<!DOCTYPE"),
@@ -770,11 +773,16 @@ FIRST_WRONG = {
 """Cases whose text is wrong before anything is replaced."""
 
 
-def test_eight_joints_are_told(tmp_path):
+def test_eight_joints_are_of_no_program(tmp_path):
     row = "      - {a: 0, alpha: 90, d: 0}\n"
     eight = SEVEN.replace(row, 2 * row)
     eight = eight.replace("  J7: [-100, 100]\n", "  J7: [-100, 100]\n  J8: [-100, 100]\n")
-    assert "an arm has 6 or 7" in refused(write(tmp_path, eight)).message
+    robot = load_robot(write(tmp_path, eight))
+    assert len(robot.joints) == 8
+    assert robot.external is None
+    with pytest.raises(Refusal) as refusal:
+        check_programmable(robot)
+    assert "8 joints" in refusal.value.findings[0].message
 
 
 # what else a file may hold

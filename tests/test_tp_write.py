@@ -433,8 +433,8 @@ def _wpr(rotation: np.ndarray) -> np.ndarray:
     )
 
 
-@pytest.mark.parametrize("name", ["J3: {limits: [-130, 30], sign: -1, offset: 90, follows: J4}"])
-def test_a_joint_follows_only_one_before_it(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["J3: {limits: [-130, 30], sign: -1, offset: 90, interaction: J4}"])
+def test_a_joint_interacts_only_with_one_before_it(name: str, tmp_path: Path) -> None:
     text = find_robot(FANUC, None).read_text()
     (tmp_path / "robot.yaml").write_text(re.sub(r"J3: .*", name, text))
     with pytest.raises(Refusal):

@@ -15,6 +15,7 @@ from postproc.cli.common import (
     residual_options,
     result_options,
 )
+from postproc.cli.decimal_option import Decimal
 
 
 @click.command()
@@ -25,6 +26,17 @@ from postproc.cli.common import (
     metavar="FILE.csv",
     callback=ending(".csv"),
     help="If two explanations fit alike: write a plan of poses that distinguish them [beside NEW.yaml].",
+)
+@click.option(
+    "--payload",
+    type=Decimal(0.0, 1e5, min_open=True),
+    metavar="KG",
+    help="Heaviest weight that the next poses may hang [rated_payload of the robot file].",
+)
+@click.option(
+    "--pulls",
+    is_flag=True,
+    help="The TCP can be pulled in any direction: the next poses may use forces as large as those measured.",
 )
 @click.option(
     "--validate",
@@ -49,6 +61,8 @@ def diagnose(
     output: Path | None,
     tool: Numbers | None,
     next_poses: Path | None,
+    payload: float | None,
+    pulls: bool,
     validate: tuple[Path, ...],
     picture: Path | None,
     page: Path | None,
@@ -86,6 +100,8 @@ def diagnose(
         robot=robot,
         output=output,
         next_poses=next_poses,
+        payload_kg=payload,
+        pulls=pulls,
         validate=validate,
         tool_mm_deg=tool,
         picture=picture,

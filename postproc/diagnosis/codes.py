@@ -14,6 +14,14 @@ CODES = define(
             action="Measure more poses; `compensate plan` proposes them.",
             example="6 poses.",
         ),
+        "DIA004": Code(
+            "info",
+            "searched in a part of the readings",
+            meaning="Where there are thousands of readings the search uses whole poses at random.",
+            consequence="What it chooses is fitted to all readings; an effect of one region may be missed.",
+            action="Diagnose the readings of a region by themselves where one is suspected.",
+            example="1,500 of 10,000 readings.",
+        ),
         "DIA003": Code(
             "info",
             "sides of approach are assumed",

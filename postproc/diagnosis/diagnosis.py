@@ -101,7 +101,9 @@ def diagnose(
             if not by <= AGREES * scatter
         ]
         agreed = not differ
-        if differ:
+        if len(differ) == len(names):
+            final = base
+        elif differ:
             final = without_effects(campaign, final, differ)
     # where an effect is missing in a model its own parameters compensate for that
     moved = refitted(final) if verdict.word not in ("ambiguous", "unknown") else ()
@@ -112,7 +114,9 @@ def diagnose(
 
 def _fitted_to(campaign: Campaign, fitted: Fit) -> Fit:
     """A fit of some readings, fitted to all of them; what those do not give keeps its value."""
-    found = fit(campaign, fitted.model, fitted.unknowns, given=fitted.point.given, near=True)
+    found = fit(
+        campaign, fitted.model, fitted.unknowns, given=fitted.point.given, near=True, factor=fitted.factor
+    )
     return replace(found, asked=fitted.asked, dropped=(*fitted.dropped, *found.dropped))
 
 

@@ -18,6 +18,12 @@ SEEN = 1e-8
 
 OUTLIER_LIMIT = 5.0
 
+SCATTERS = 0.01
+"""Probability that scatter alone makes the largest residual of all poses larger."""
+
+REGIONS, LLOYD = 4, 10
+"""Regions of the joints' space that are left out in turn, and steps of their search."""
+
 USUAL = 3.0
 """Times what was found of an effect that it is expected to be, of readings that were left out."""
 
@@ -56,7 +62,9 @@ def held_out_gain(search: Search, last: Explained, group: int, part: Ints | None
 
 def worst_ratio(search: Search, last: Explained, group: int, part: Ints) -> float:
     """The largest residual of a pose left out with the group, over that without it; part (R,): as of
-    ``held_out_gain``."""
+    ``held_out_gain``.  Where the scatter is known, what it makes of the largest pose is no growth."""
+    from scipy.special import chdtri
+
     linear = search.linear
     rows = len(linear.residual) - linear.priors
     of = np.append(np.repeat(part, rows // len(part)), np.full(linear.priors, -1))
@@ -67,8 +75,12 @@ def worst_ratio(search: Search, last: Explained, group: int, part: Ints) -> floa
         away = _left_out(matrix, linear.residual, of)[:rows]
         return float(np.sqrt(np.bincount(pose, away**2).max()))
 
-    without = largest([g for g in last.groups if g != group])
-    return largest(last.groups) / without if without > 0 else 1.0
+    counts = np.bincount(pose[linear.residual[:rows] != 0.0], minlength=1).max()
+    floor = (
+        np.sqrt(chdtri(counts, SCATTERS / search.base.campaign.poses)) if search.linear.problem.known else 0.0
+    )
+    without = max(largest([g for g in last.groups if g != group]), floor)
+    return max(largest(last.groups), floor) / without if without > 0 else 1.0
 
 
 def _left_out(matrix: Floats, target: Floats, part: Ints) -> Floats:
@@ -117,15 +129,30 @@ def _misfit(matrix: Floats, target: Floats, part: Ints, variance: float) -> floa
 
 def regions_of(search: Search) -> Ints | None:
     """(R,) a region of the joints' space for each reading; None with too few poses."""
-    from scipy.cluster.vq import kmeans2
-
     campaign = search.base.campaign
     if campaign.poses < 24:
         return None
     q = campaign.readings.q
     spread = np.where(np.ptp(q, axis=0) > 1e-9, np.ptp(q, axis=0), 1.0)
-    _, label = kmeans2(q / spread, 4, minit="++", rng=np.random.default_rng(0))
-    return label if min(np.bincount(label, minlength=4)) > 0 else None
+    label = _clusters(q / spread, REGIONS)
+    return label if min(np.bincount(label, minlength=REGIONS)) > 0 else None
+
+
+def _clusters(points: Floats, count: int) -> Ints:
+    """(R,) of ``count`` clusters of ``points`` (R, n), by Lloyd's iteration from points far from each other."""
+    away = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    first: list[int] = []
+    for _ in range(count):
+        first.append(int(np.argmax(away)))
+        to_last = np.linalg.norm(points - points[first[-1]], axis=1)
+        away = to_last if len(first) == 1 else np.minimum(away, to_last)
+    centres = points[first]
+    label = np.zeros(len(points), np.int64)
+    for _ in range(LLOYD):
+        label = np.argmin(((points[:, None] - centres) ** 2).sum(axis=2), axis=1)
+        own = [points[label == k] for k in range(count)]
+        centres = np.array([one.mean(axis=0) if len(one) else centres[k] for k, one in enumerate(own)])
+    return label
 
 
 def sessions_of(search: Search) -> Ints | None:

@@ -12,13 +12,20 @@ from postproc.base.units import DEG, MM
 from postproc.diagnosis.selection import basis_of, outside
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit
-from postproc.robot.chain import generalized_force
+from postproc.robot.chain import ChainKinematics, generalized_force
 
 BINS, POSES = 6, 6
 """Parts that a variable is divided into at most, and poses in each at least."""
 
 CHANCE = 0.01
 SHOWN = 8
+
+FEW = 3
+"""Readings that a part needs to be named."""
+
+SIDE, SIDES = ("side", 1.0), {-1: "places from above", 0: "places of unknown side", 1: "places from below"}
+READING = ("reading", 1.0)
+"""Units of a sense of approach, and of the number of a reading, and how the former are called."""
 
 FLIPS = 4000
 """Times that chance is asked."""
@@ -82,7 +89,7 @@ def residual_patterns(
             by_chance = float(fdtrc(rank, max(1, against.freedom), explained / rank / against.factor))
         share = 1.0 - (1.0 - explained / squares) * rows / (rows - rank)
         if by_chance * len(tried) < chance and share > 0:
-            words = _words(fitted.point.residual[:, :3], part, parts, unit)
+            words = pattern_words(fitted.point.residual[:, :3], part, parts, unit)
             if variable in ("order", "time") and goes_with_poses(values, campaign.readings.q):
                 words += "; but the poses were taken in such an order: measure again in random order"
             clear_patterns.append(ResidualPattern(variable, words, float(share)))
@@ -124,8 +131,11 @@ def patterns(
     loaded = bool(readings.wrench.any())
     for i, joint in enumerate(fitted.model.robot.joints):
         row = chain.motor_rows[i]
-        axis = swept.axes[row].T
-        turn = axis if joint.kind != "revolute" else np.cross(axis, points - swept.origins[row].T)
+        turn = _turn(swept, row, points)
+        for follower, leader, ratio in chain.couplings:
+            if leader == row:
+                turn = turn + ratio * _turn(swept, follower, points)
+        turn = np.where(readings.based[:, None], 0.0, turn)
         if campaign.tracked:
             frames = fitted.point.given.frames.rotation[readings.session]
             turn = (frames @ turn[:, :, None])[:, :, 0]
@@ -135,16 +145,22 @@ def patterns(
             yield f"{joint.name} over its torque", torque[row], turn, ("N m", 1.0)
         sense = campaign.conditions.direction
         if sense is not None and np.ptp(sense[campaign.at, i]) > 0:
-            yield f"{joint.name} over its approach", sense[campaign.at, i], turn, ("", 1.0)
+            yield f"{joint.name} over its approach", sense[campaign.at, i], turn, SIDE
     force = np.linalg.norm(readings.wrench[:, :3], axis=1)
     if np.ptp(force) > 0:
         yield "load", force, None, ("N", 1.0)
-    yield "order", np.arange(len(readings), dtype=float), None, ("", 1.0)
+    yield "order", np.arange(1.0, len(readings) + 1), None, READING
     for name, values, unit in (("time", readings.time, "s"), ("temperature", readings.temperature, "degC")):
         if values is not None and np.ptp(values) > 0:
             yield name, values, None, (unit, 1.0)
     if len(readings.sessions) > 1:
         yield "session", readings.session.astype(float), None, ("", 1.0)
+
+
+def _turn(swept: ChainKinematics, row: int, points: Floats) -> Floats:
+    """(R, 3) what a coordinate moves ``points`` (R, 3) [m] by, per rad or m."""
+    axis = swept.axes[row].T
+    return np.cross(axis, points - swept.origins[row].T) if swept.turns[row] else axis
 
 
 def _parts(values: Floats, count: int) -> tuple[Ints, Floats]:
@@ -165,15 +181,24 @@ def _columns(part: Ints, parts: int, turns: Floats | None) -> Floats:
     return np.asarray(np.eye(3)[None, :, :, None] * on[:, None, None, :]).reshape(len(part), 3, -1)
 
 
-def _words(residual: Floats, part: Ints, parts: Floats, unit: tuple[str, float]) -> str:
-    count = range(len(parts))
+def pattern_words(residual: Floats, part: Ints, parts: Floats, unit: tuple[str, float]) -> str:
+    """Where the ``residual`` (R, 3) [m] is largest and smallest, of the ``part`` (R,) that each reading is in;
+    ``parts`` (k, 2): where these start and end."""
+    enough = min(FEW, int(np.bincount(part).max()))
     size = np.array(
-        [np.sqrt(3 * np.nanmean(residual[part == k] ** 2)) if (part == k).any() else np.nan for k in count]
+        [
+            np.sqrt(3 * np.nanmean(residual[part == k] ** 2)) if (part == k).sum() >= enough else np.nan
+            for k in range(len(parts))
+        ]
     )
     most, least = int(np.nanargmax(size)), int(np.nanargmin(size))
 
     def span(k: int) -> str:
         low, high = parts[k] / unit[1]
+        if unit == SIDE:
+            return SIDES[int(low)]
+        if unit == READING:
+            return f"readings {np.ceil(low):.0f} .. {np.floor(high):.0f}"
         return f"{low:.4g}{f' .. {high:.4g}' if high > low else ''}{f' {unit[0]}' if unit[0] else ''}"
 
     return f"{size[most] / MM:.3g} mm at {span(most)}, {size[least] / MM:.3g} mm at {span(least)}"

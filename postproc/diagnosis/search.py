@@ -21,6 +21,8 @@ from postproc.diagnosis.selection import (
     problem,
     selected,
 )
+from postproc.effects.joint_offset import JointOffset
+from postproc.effects.link_geometry import LinkGeometry
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit
 from postproc.identification.least_squares import prior_rows, prior_weight, scales
@@ -38,8 +40,11 @@ IMITATED = 1e-3
 """Share of a column that must lie outside of what the robot file's own parameters do."""
 
 FORM = 0.01
-"""Share of what another effect explains that one must explain itself: no form in the library is exact, and what a large
-effect does beside its form looks like small ones."""
+"""Share of what another effect explains that one must explain itself: no law of the library is exact, and what a large
+effect does beside its law looks like small ones."""
+
+EXACT = (JointOffset.name, LinkGeometry.name)
+"""Where axes lie is no law that could be inexact: however wrong a drawing was, what is small beside it counts."""
 
 SHARED = 1.0
 """Stated standard deviations that readings of a pose may share: of a robot that does not quite come back, of one
@@ -141,7 +146,8 @@ def _confirmed(
         given = _linear(campaign, base, weights, fitted, chosen, chosen).problem
         others = [g for g in places if g != weakest]
         gains = [one.squares - explained(linear.problem, places).squares for one in without]
-        if min(gains) >= FORM * max(gains) and counts(
+        of_laws = [gain for gain, c in zip(gains, chosen, strict=True) if c.name not in EXACT]
+        if min(gains) >= FORM * max(of_laws, default=0.0) and counts(
             given, explained(given, others), explained(given, places), among
         ):
             break

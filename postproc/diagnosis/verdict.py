@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,8 +15,11 @@ from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patte
 from postproc.diagnosis.search_result import Alternative, Search
 from postproc.diagnosis.selection import (
     Explained,
+    basis_of,
     clipped_squares,
+    counts,
     explained,
+    outside,
     probability,
     scatter,
 )
@@ -67,6 +70,7 @@ WORST = 1.1
 
 NOT_ENOUGH = "too much would remain for a name"
 OTHER_COURSE = "the readings follow another course than that of this effect"
+PART_OF_COURSE = "what it would explain is a part of that other course"
 SIZE_UNDETERMINED = "it would have to be unusually large, and the readings hardly determine its size"
 
 
@@ -165,6 +169,12 @@ def judge(search: Search) -> Verdict:
     # two forms of one effect on one joint do not make its name uncertain
     sets = tuple(a for a in aliases if len({(c.name, c.joint) for c in a}) > 1)
     formless = any(why == OTHER_COURSE for _, why in rejected)
+    if formless:
+        # a zero of the joint that follows another course may be a part of that course
+        kept = [k for k, g in enumerate(groups) if not _in_another_course(search, last, g)]
+        rejected += [(one.candidate, PART_OF_COURSE) for k, one in enumerate(named) if k not in kept]
+        named, aliases = [named[k] for k in kept], [aliases[k] for k in kept]
+        groups = [groups[k] for k in kept]
     if formless or unexplained:
         # what is certain stays, whatever remains: it must take its share by itself
         rare = np.inf if formless else EXPLAINS
@@ -313,6 +323,30 @@ def _of_another_course(search: Search, candidate: Candidate) -> bool:
     """Whether another course over the same joint or time, one that no effect has, clearly explains more."""
     against = [r for r in search.rivals if r.of == candidate.key and r.is_decoy and r.fitted]
     return any(r.margin < -MARGIN for r in against)
+
+
+def _in_another_course(search: Search, last: Explained, group: int) -> bool:
+    """Whether a chosen ``group`` explains nothing beside the courses without a name that took the places of others on
+    its joint."""
+    linear, given = search.linear, search.linear.problem
+    mine = linear.candidates[group]
+    others = [r for r in search.rivals if r.is_decoy and r.fitted and r.margin < -MARGIN]
+    others = [r for r in others if r.candidate.joint == mine.joint and r.candidate.columns.any()]
+    if not others:
+        return False
+    gone = {r.of for r in others}
+    columns = np.concatenate([linear.weights(np.nan_to_num(r.candidate.columns)) for r in others], axis=1)
+    columns = np.concatenate([columns, np.zeros((linear.priors, columns.shape[1]))])
+    basis = basis_of(outside(linear.basis, columns))
+    beside = replace(
+        given,
+        residual=outside(basis, given.residual[:, None])[:, 0],
+        matrix=outside(basis, given.matrix),
+        rank=given.rank + basis.shape[1],
+    )
+    rest = [g for g in last.groups if g != group and linear.candidates[g].key not in gone]
+    without, with_ = explained(beside, rest), explained(beside, [*rest, group])
+    return not counts(beside, without, with_, len(linear.candidates))
 
 
 def _against(search: Search, mine: Candidate) -> list[Alternative]:

@@ -214,7 +214,9 @@ class LinearCompliance(ComplianceLaw):
 
 
 class Load(Effect, ABC):
-    """A generalized force on coordinates."""
+    """A generalized force on coordinates.  ``by_rest``: it asks where the coordinates are without load."""
+
+    by_rest: ClassVar[bool] = False
 
     @abstractmethod
     def add_force(self, values: Values, state: ChainState, force: Floats, slope: Floats) -> None:

@@ -75,6 +75,7 @@ class GravityCompensator(EnergyLoad):
 
     name = "gravity_compensator"
     family = "elastic"
+    by_rest = True
 
     def __init__(
         self,

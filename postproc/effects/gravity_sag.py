@@ -33,7 +33,8 @@ class GravitySag(Offset):
 
     def __init__(self, joints: Sequence[Joint]) -> None:
         turning = [i for i, joint in enumerate(joints) if joint.kind == "revolute"]
-        at_zero = Chain(joints, Poses.identity()).evaluate(np.zeros((len(joints), 1)), Poses.identity())
+        chain = Chain(joints, Poses.identity())
+        at_zero = chain.evaluate(chain.placed(np.zeros((1, len(joints)))), Poses.identity())
         first = at_zero.links[turning[0]][2][:, 0] if turning else np.zeros(3)
         carrying = turning[1:] if np.hypot(first[0], first[1]) < UPRIGHT else turning
         self._links = {i: [k for k in turning if k >= i][:2] for i in carrying}

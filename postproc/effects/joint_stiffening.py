@@ -21,6 +21,7 @@ class JointStiffening(EnergyLoad):
 
     name = "joint_stiffening"
     family = "elastic"
+    by_rest = True
     zero_without_load = True
 
     def __init__(self, joints: Sequence[Joint]) -> None:

@@ -40,7 +40,7 @@ class LinkGravity(EnergyLoad):
             Parameter("mass", "kg", 0.0, 0.0, 1e5, source),
         )
         chain = Chain(joints, Poses.identity())
-        at_zero = chain.evaluate(np.zeros((len(joints), 1)), Poses.identity())
+        at_zero = chain.evaluate(chain.placed(np.zeros((1, len(joints)))), Poses.identity())
         self._frames = [np.stack([c[:, 0] for c in columns], axis=1) for columns in at_zero.links]
 
     def _moments(self, values: Values, state: ChainState) -> Floats:

@@ -20,6 +20,7 @@ class TransmissionError(Offset):
 
     name = "transmission_error"
     family = "geometric"
+    whole = True
 
     def __init__(self, joints: Sequence[Joint], harmonics: Sequence[float] = (1.0,)) -> None:
         self.harmonics = tuple(harmonics)

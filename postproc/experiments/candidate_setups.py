@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -43,7 +43,8 @@ class CandidateSetups:
 
     limits (n, 2) [rad, m] of the axes; box (3, 2) [m], robot base: where TCP, flange and reflectors may be; tracker
     (3,) [m], robot base, None: every reflector is seen; cone [rad]: half angle about the direction in which a
-    reflector faces; spacing [rad]: two poses differ by that in one axis at least.
+    reflector faces; spacing [rad]: two poses differ by that in one axis at least.  pulls (P, 3) [N]: forces at the TCP,
+    robot base axes, that can be pulled with, each an alternative to the loads.
     """
 
     tool: Poses
@@ -59,6 +60,7 @@ class CandidateSetups:
     tracker: Floats | None
     cone: float
     spacing: float
+    pulls: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property
     def facing(self) -> Floats:
@@ -73,30 +75,34 @@ class Setups:
     """C poses to set up.
 
     q (C, n) [rad, m]; load (C, l) [kg]: hung there, one after the other; visible (C, T): targets in sight; direction
-    (C, n): sense -1, 1 in which each axis comes to its place, None where that does not matter.
+    (C, n): sense -1, 1 in which each axis comes to its place, None where that does not matter; pull (C, 3) [N]: what
+    is pulled with there, beside the load, None where nothing is.
     """
 
     q: Floats
     load: Floats
     visible: Bools
     direction: Floats | None = None
+    pull: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.q)
 
     def __getitem__(self, rows: Any) -> Setups:
-        direction = None if self.direction is None else self.direction[rows]
-        return Setups(self.q[rows], self.load[rows], self.visible[rows], direction)
+        direction, pull = (None if one is None else one[rows] for one in (self.direction, self.pull))
+        return Setups(self.q[rows], self.load[rows], self.visible[rows], direction, pull)
 
     def __add__(self, other: Setups) -> Setups:
-        direction = None
-        if self.direction is not None and other.direction is not None:
-            direction = np.concatenate([self.direction, other.direction])
+        pairs = (self.direction, other.direction), (self.pull, other.pull)
+        direction, pull = (
+            None if one is None or more is None else np.concatenate([one, more]) for one, more in pairs
+        )
         return Setups(
             np.concatenate([self.q, other.q]),
             np.concatenate([self.load, other.load]),
             np.concatenate([self.visible, other.visible]),
             direction,
+            pull,
         )
 
 
@@ -175,11 +181,16 @@ def drawn(model: StiffnessModel, offer: CandidateSetups, count: int, rng: np.ran
     if any(term.effect.by_direction for term in model.terms):
         direction = rng.choice([-1.0, 1.0], q.shape)
     visible = _allowed(model, offer, q)[1]
-    if offer.each_load or len(offer.loads) == 1:
+    if not len(offer.pulls) and (offer.each_load or len(offer.loads) == 1):
         return Setups(q, np.tile(offer.loads, (len(q), 1)), visible, direction)
     once = Setups(q, np.zeros((len(q), 1)), visible, direction)
-    rows = np.repeat(np.arange(len(q)), len(offer.loads))
-    return replace(once[rows], load=np.tile(offer.loads, len(q))[:, None])
+    choices = len(offer.loads) + len(offer.pulls)
+    rows = np.repeat(np.arange(len(q)), choices)
+    load = np.tile(np.append(offer.loads, np.zeros(len(offer.pulls))), len(q))[:, None]
+    if not len(offer.pulls):
+        return replace(once[rows], load=load)
+    pull = np.concatenate([np.zeros((len(offer.loads), 3)), offer.pulls])
+    return replace(once[rows], load=load, pull=np.tile(pull, (len(q), 1)))
 
 
 def around(
@@ -234,6 +245,8 @@ def readings_of(model: StiffnessModel, offer: CandidateSetups, setups: Setups) -
     load = np.repeat(setups.load.reshape(-1), targets)
     wrench = np.zeros((len(row), 6))
     wrench[:, :3] = load[:, None] * model.gravity
+    if setups.pull is not None:
+        wrench[:, :3] += setups.pull[row]
     readings = planned(
         [(joint.name, joint.kind != "revolute") for joint in robot.joints],
         setups.q[row],

@@ -1,6 +1,7 @@
 """What the readings of a campaign see of a model, and what is between the two: tracker and targets.
 
-A reading sees one point of the robot at one state: a target on the flange, or without targets the TCP.
+A reading sees one point of the robot at one state: a target on the flange, or without targets the TCP.  A target on the
+base goes with the base alone: p, R are then the base's own place and turn, which only what moves the base changes.
 
     absolute     T_s (1 + e) (p + R c)                     T_s: the robot base in the tracker's frame of session s
     deflection   (p + R c) loaded - (p + R c) unloaded     with the same motors, robot base axes
@@ -44,13 +45,14 @@ LARGEST_SCALE = 5e-4
 class PredictedReadings:
     """The tool at every state of a campaign: ``rotation`` (S, 3, 3); ``body`` (S, 3) [m], the place of the TCP without
     what the spindle gives, ``tip`` (S, 3) with it; ``displacement`` (S, m), to start a model nearby with; ``converged``
-    (S,)."""
+    (S,); ``base`` (S): where the robot base is, None where it stays at its place."""
 
     rotation: Floats
     body: Floats
     tip: Floats
     displacement: Floats
     converged: Bools
+    base: Poses | None = None
 
 
 @dataclass(frozen=True)
@@ -92,8 +94,12 @@ class Campaign:
         # started on the flange where nothing is stated
         on_flange = [readings.places.get(name, np.zeros(3)) for name in named] or [self.tool.position]
         into_tool = self.tool.inverse()
+        self.on_base: Bools = np.array([name in readings.on_base for name in self.targets])
         self.stated_places = np.array(
-            [into_tool.rotation @ place + into_tool.position for place in on_flange]
+            [
+                place if base else into_tool.rotation @ place + into_tool.position
+                for place, base in zip(on_flange, self.on_base, strict=True)
+            ]
         )
         self.stated_turns = np.tile(np.eye(3), (len(self.targets), 1, 1))
         self.known_scale: float | None = None
@@ -115,6 +121,14 @@ class Campaign:
                 new.place_known[k] = new.turn_known[k] = True
         new.known_scale = given.scale
         new.nuisance_names = tuple(new._nuisance_names())
+        return new
+
+    def seen_in(self, rows: Ints) -> Campaign:
+        """The campaign with the readings ``rows`` (K,) only; its states stay, and so does what is predicted of them."""
+        new = copy(self)
+        new.readings = self.readings.part(rows)
+        new.at, new.pose = self.at[rows], self.pose[rows]
+        new.still = None if self.still is None else self.still[rows]
         return new
 
     def shifted(self, by: Floats) -> Campaign:
@@ -157,27 +171,42 @@ class Campaign:
         """All states at rest under ``model``; ``start`` (S, m): displacement of a model nearby; ``tolerance`` as of the
         equilibrium."""
         rest = model.equilibrium(self.q, self.wrench, self.tool, self.conditions, start, tolerance)
+        moves = self.on_base.any() and model.chain.names[0].startswith("base.")
+        base = model.chain.base(rest.coordinates.T) if moves else None
         return PredictedReadings(
-            rest.pose.rotation, rest.mount, rest.pose.position, rest.displacement, rest.converged
+            rest.pose.rotation, rest.mount, rest.pose.position, rest.displacement, rest.converged, base
         )
+
+    def turned(self, predicted: PredictedReadings, at: Ints) -> Floats:
+        """(R, 3, 3) turn of what each reading's target is fixed to, in states ``at`` (R,)."""
+        rotation = predicted.rotation[at]
+        based = self.readings.based
+        if based.any():
+            rotation = rotation.copy()
+            rotation[based] = np.eye(3) if predicted.base is None else predicted.base.rotation[at][based]
+        return rotation
 
     def points(self, predicted: PredictedReadings, places: Floats, at: Ints) -> Floats:
         """(R, 3) [m] what each reading would see in states ``at`` (R,), robot base, with the targets at ``places`` (T,
         3) [m] on the flange."""
-        origin = predicted.tip if self.at_tip else predicted.body
+        origin = (predicted.tip if self.at_tip else predicted.body)[at]
+        based = self.readings.based
+        if based.any():
+            origin = origin.copy()
+            origin[based] = 0.0 if predicted.base is None else predicted.base.position[at][based]
         place = places[self.readings.target]
-        return np.asarray(origin[at] + (predicted.rotation[at] @ place[:, :, None])[:, :, 0])
+        return np.asarray(origin + (self.turned(predicted, at) @ place[:, :, None])[:, :, 0])
 
     def expected(self, predicted: PredictedReadings, given: Nuisances) -> tuple[Floats, Floats | None]:
         """(R, 3) [m], and rotations (R, 3, 3) where they are measured, in the axes of the readings; NaN where the model
         has no rest."""
         points = self.points(predicted, given.places, self.at)
         lost = ~predicted.converged[self.at]
-        rotation = predicted.rotation[self.at]
+        rotation = self.turned(predicted, self.at)
         if self.still is not None:
             points = points - self.points(predicted, given.places, self.still)
             lost = lost | ~predicted.converged[self.still]
-            rotation = rotation @ np.swapaxes(predicted.rotation[self.still], 1, 2)
+            rotation = rotation @ np.swapaxes(self.turned(predicted, self.still), 1, 2)
         else:
             rotation = rotation @ given.turns[self.readings.target]
         points = np.where(lost[:, None], np.nan, points)
@@ -272,9 +301,9 @@ class Campaign:
                     derivatives[of, 3:, columns] = axes[of]
                 continue
             of = self.readings.target == k
-            rotation = predicted.rotation[self.at[of]]
+            rotation = self.turned(predicted, self.at)[of]
             if self.still is not None:
-                rotation = rotation - predicted.rotation[self.still[of]]
+                rotation = rotation - self.turned(predicted, self.still)[of]
             rows = slice(0, 3) if kind == "place" else slice(3, 6)
             derivatives[of, rows, columns] = axes[of] @ rotation if self.tracked else rotation
         return derivatives if self.posed else derivatives[:, :3]
@@ -290,23 +319,29 @@ class Campaign:
         on = np.array([self.at_tip or not name.startswith("spindle.") for name in chain.names])
         j = jacobian(state.swept)
         derivatives = np.zeros((len(self), 6 if self.posed else 3, moved.shape[2]))
-        turn, tip = j[:, 3:] @ moved, (j[:, :3] * on) @ moved
-        origin = predicted.tip if self.at_tip else predicted.body
+        of_base = np.array([name.startswith("base.") for name in chain.names])
+        moves = [((j[:, :3] * on) @ moved, j[:, 3:] @ moved)]
+        if self.on_base.any():
+            moves.append(((j[:, :3] * of_base) @ moved, (j[:, 3:] * of_base) @ moved))
 
-        def at(states: Ints, target: int) -> Floats:
-            lever = origin[states] + predicted.rotation[states] @ given.places[target] - predicted.tip[states]
-            return np.asarray(tip[states] - np.cross(lever[:, :, None], turn[states], axis=1))
+        def at(states: Ints) -> None:
+            points, sign = self.points(predicted, given.places, states), 1.0 if states is self.at else -1.0
+            for target in range(len(self.targets)):
+                rows = np.flatnonzero(self.readings.target == target)
+                own = states[rows]
+                tip, turn = (half[own] for half in moves[int(self.on_base[target])])
+                lever = points[rows] - predicted.tip[own]
+                derivatives[rows, :3] += sign * (tip - np.cross(lever[:, :, None], turn, axis=1))
+                if self.posed:
+                    derivatives[rows, 3:] += sign * (turn if sign > 0 else relative[rows] @ turn)
 
-        for target in range(len(self.targets)):
-            rows = np.flatnonzero(self.readings.target == target)
-            derivatives[rows, :3] = at(self.at[rows], target)
-            if self.still is not None:
-                derivatives[rows, :3] -= at(self.still[rows], target)
-        if self.posed:
-            derivatives[:, 3:] = turn[self.at]
-            if self.still is not None:
-                relative = predicted.rotation[self.at] @ np.swapaxes(predicted.rotation[self.still], 1, 2)
-                derivatives[:, 3:] -= relative @ turn[self.still]
+        relative = np.empty(0)
+        if self.still is not None:
+            back = np.swapaxes(self.turned(predicted, self.still), 1, 2)
+            relative = self.turned(predicted, self.at) @ back
+        at(self.at)
+        if self.still is not None:
+            at(self.still)
         if self.tracked:
             axes = given.frames.rotation[self.readings.session]
             for half in range(0, derivatives.shape[1], 3):

@@ -123,6 +123,7 @@ def fit(
     robust: bool = False,
     given: Nuisances | None = None,
     near: bool = False,
+    factor: float = 1.0,
 ) -> Fit:
     """The weighted least squares of the readings ``rows`` (R,) (all without it) over the unknowns and nuisances.
 
@@ -130,7 +131,7 @@ def fit(
     linearized problem at the solution; where the residuals are clearly larger than the stated scatter, or none is
     stated, they are as wide as the residuals ask for.  ``robust``: readings far off are weighed down (Huber).
     ``given``: tracker and targets to start with, where they are about known; ``near``: so is the model, the columns
-    at which serve all through.
+    at which serve all through.  ``factor``: about the variance of the readings over the assumed one, to start with.
 
     Raises Refusal IDN002 with fewer readings than unknowns, IDN003 where the model to start with has no rest.
     """
@@ -153,7 +154,7 @@ def fit(
     start_point = point
     steps, close = (NEAR_STEPS, NEAR) if near else (MAX_STEPS, CLOSE)
     free, dropped = list(unknowns), list[Dropped]()
-    factor, again = 1.0, PRIOR_ROUNDS if any(u.prior is not None for u in unknowns) else 0
+    again = PRIOR_ROUNDS if any(u.prior is not None for u in unknowns) else 0
     while True:
         point = descended(campaign, point, free, plain, near, steps, factor, close)
         updated = _with_turns(campaign, point, noise, plain)

@@ -72,12 +72,12 @@ def _moved_targets(campaign: Campaign, model: StiffnessModel) -> tuple[Readings,
         return readings, []
     names = readings.targets or ("target",)
     target = readings.target if readings.targets else np.zeros(len(readings), np.int64)
-    anew = {}
+    anew, fixed = {}, {*readings.places, *readings.on_base}
     for k, name in enumerate(names):
         for s, session in enumerate(readings.sessions):
-            if name not in readings.places and (target[readings.session == s] == k).any():
+            if name not in fixed and (target[readings.session == s] == k).any():
                 anew[k, s] = f"{name} ({session})"
-    kept = [name for name in names if name in readings.places]
+    kept = [name for name in names if name in fixed]
     split = (*kept, *anew.values())
     place = [
         split.index(anew[k, s]) if (k, s) in anew else split.index(names[k])

@@ -45,14 +45,15 @@ def _session(
     campaign: Campaign, predicted: PredictedReadings, given: Nuisances, k: int, own: Ints
 ) -> Nuisances:
     some = own[np.linspace(0, len(own) - 1, min(len(own), SAMPLE)).round().astype(int)]
+    few, all_of_few = campaign.seen_in(some), np.arange(len(some))
     tries = []
     for turn in _cube_turns():
         rotation = given.frames.rotation.copy()
         rotation[k] = turn
         start = replace(given, frames=Poses(rotation, given.frames.position))
-        tries.append(_descended(campaign, predicted, start, some, 3))
+        tries.append(_descended(few, predicted, start, all_of_few, 3))
     tries = [
-        _descended(campaign, predicted, tried, some, 12) for tried, _ in sorted(tries, key=_size)[:FOLLOWED]
+        _descended(few, predicted, tried, all_of_few, 12) for tried, _ in sorted(tries, key=_size)[:FOLLOWED]
     ]
     return _descended(campaign, predicted, min(tries, key=_size)[0], own, MAX_STEPS)[0]
 
@@ -66,13 +67,15 @@ def _descended(
 ) -> tuple[Nuisances, float]:
     """Gauss-Newton on positions: the nuisances, and the mean square that remains [m2]."""
     last, before = np.inf, given
+    if len(rows) < len(campaign):
+        campaign = campaign.seen_in(rows)
     for _ in range(steps):
-        residual = campaign.residual(predicted, given)[rows, :3]
+        residual = campaign.residual(predicted, given)[:, :3]
         size = float(np.mean(residual**2))
         if not size < last * (1 - 1e-9):
             return before, last
         last, before = size, given
-        columns = campaign.nuisance_columns(predicted, given)[rows, :3]
+        columns = campaign.nuisance_columns(predicted, given)[:, :3]
         if campaign.scaled:  # of an arm that is not calibrated the scale says nothing yet
             columns[:, :, -1] = 0.0
         matrix = columns.reshape(residual.size, -1)
@@ -87,7 +90,7 @@ def _turned_targets(
     """The axes of targets whose turn is not stated: the mean over all readings."""
     readings, turns = campaign.readings, given.turns.copy()
     assert readings.rotation is not None
-    rotation = predicted.rotation[campaign.at]
+    rotation = campaign.turned(predicted, campaign.at)
     if campaign.tracked:
         rotation = given.frames.rotation[readings.session] @ rotation
     for k in np.flatnonzero(~campaign.turn_known):

@@ -52,9 +52,9 @@ def expected_joints(names: Sequence[str], joints: Sequence[tuple[str, bool]]) ->
 
 def split_columns(
     table: CsvTable, joints: Sequence[tuple[str, bool]]
-) -> tuple[CsvTable, CsvTable, bool, tuple[str, ...]]:
+) -> tuple[CsvTable, CsvTable, bool, CsvTable]:
     """The columns of the joints in their order, the others under their own names, whether they hold deflections, and
-    the names of columns that are no part of the format.
+    those that are no part of the format.
 
     Refusal: a column that is missing, of another unit, one too many, or that differs from a known one by a typing
     error.
@@ -90,8 +90,13 @@ def split_columns(
             )
     axes = {name: table.columns[heads[name.lower()][0]] for name in own}
     rest = {spelled[name]: table.columns[heads[name][0]] for name in others if name in spelled}
-    names = tuple(heads[name][0] for name in ignored)
-    return replace(table, columns=axes), replace(table, columns=rest), deflection, names
+    extra = {heads[name][0]: table.columns[heads[name][0]] for name in ignored}
+    return (
+        replace(table, columns=axes),
+        replace(table, columns=rest),
+        deflection,
+        replace(table, columns=extra),
+    )
 
 
 def _is_mistyped(name: str, known: Collection[str]) -> bool:

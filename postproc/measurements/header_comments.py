@@ -15,11 +15,12 @@ from postproc.base.geometry import Poses
 from postproc.base.tables import CsvTable, comments_above, finite_number
 from postproc.base.units import DEG, MM
 
-KEYS = ("robot", "frame", "tool", "sigma_mm", "sigma_deg", "target")
+KEYS = ("robot", "frame", "tool", "sigma_mm", "sigma_deg", "target", "base_target")
+TARGETS = ("target", "base_target")
 FRAMES = ("tracker", "robot")
 
 # the name of a target may hold a colon, numbers do not
-_TARGET = re.compile(r"target(\s.*|\s*)[:=]([^:=]*)", re.IGNORECASE)
+_TARGET = re.compile(r"((?:base_)?target)(\s.*|\s*)[:=]([^:=]*)", re.IGNORECASE)
 _KEYED = re.compile(r"([^:=]*+)[:=]\s*+(.*)")
 _CLOSE = 0.75  # of difflib's ratio: sigma is close to sigma_mm, load is not close to tool
 
@@ -27,7 +28,7 @@ _CLOSE = 0.75  # of difflib's ratio: sigma is close to sigma_mm, load is not clo
 @dataclass(frozen=True)
 class HeaderComments:
     """What the comments state, in SI; ``frame`` is "" and ``sigma`` NaN where not stated; ``places``: name of a target
-    -> its place (3,) [m] on the flange; ``lines``: name of a target -> line."""
+    -> its place (3,) [m] on the flange, of those ``on_base`` in the robot base; ``lines``: name of a target -> line."""
 
     robot: str
     frame: str
@@ -35,6 +36,7 @@ class HeaderComments:
     sigma: float
     sigma_turn: float | None
     places: dict[str, Floats]
+    on_base: frozenset[str]
     lines: dict[str, int]
     findings: list[Finding]
 
@@ -81,14 +83,22 @@ def stated_in(table: CsvTable) -> HeaderComments:
         message = f"# frame: {frame[:40]!r} is not a frame{nearest(frame, FRAMES)}"
         raise _wrong(table, values["frame", ""][0], message, "use one of " + ", ".join(FRAMES))
     sigma_place, sigma_turn = sigma("sigma_mm", MM), sigma("sigma_deg", DEG)
-    lines = {name: line for (key, name), (line, _) in values.items() if key == "target"}
+    lines = {name: line for (key, name), (line, _) in values.items() if key in TARGETS}
+    of_base = {name: text for (key, name), (_, text) in values.items() if key == "base_target"}
+    for name in of_base:
+        if ("target", name) in values:
+            raise _wrong(table, lines[name], f"{name!r} is both a target and a base_target")
+    stated = {
+        name: "base_target" if name in of_base else "target" for name in lines if of_base.get(name) != ""
+    }
     return HeaderComments(
         robot=robot,
         frame=frame,
         tool=Poses.from_abc(np.array(tool[:3]) * MM, np.array(tool[3:] or [0.0] * 3) * DEG) if tool else None,
         sigma=np.nan if sigma_place is None else sigma_place,
         sigma_turn=sigma_turn,
-        places={name: np.array(numbers("target", (3,), "x y z (mm)", name)) * MM for name in lines},
+        places={name: np.array(numbers(key, (3,), "x y z (mm)", name)) * MM for name, key in stated.items()},
+        on_base=frozenset(of_base),
         lines=lines,
         findings=findings,
     )
@@ -110,12 +120,13 @@ def _stated(table: CsvTable) -> tuple[dict[tuple[str, str], tuple[int, str]], li
             help = "write # key: value with one of " + ", ".join(KEYS)
         elif (key, name) in values:
             raise _wrong(table, line, f"# {_title(key, name)} occurs in line {values[key, name][0]} already")
-        elif key == "target" and not name:
+        elif key in TARGETS and not name:
+            where = "on the flange" if key == "target" else "robot base"
             raise _wrong(
                 table,
                 line,
-                "# target: the name of the target is missing",
-                "write # target NAME: x y z (mm, on the flange)",
+                f"# {key}: the name of the target is missing",
+                f"write # {key} NAME: x y z (mm, {where})",
             )
         else:
             values[key, name] = line, value
@@ -129,7 +140,7 @@ def _keyed(text: str) -> tuple[str, str, str]:
     text = text.lstrip("# \t")
     target = _TARGET.fullmatch(text)
     if target:
-        return "target", target[1].strip(), target[2].strip()
+        return target[1].lower(), target[2].strip(), target[3].strip()
     keyed = _KEYED.fullmatch(text)
     return (keyed[1].rstrip().lower(), "", keyed[2].strip()) if keyed else ("", "", "")
 

@@ -46,6 +46,11 @@ def joined(several: Sequence[Readings]) -> Readings:
         parts["rotation"] = [
             np.full((len(one), 3, 3), np.nan) if one.rotation is None else one.rotation for one in several
         ]
+    names, _ = numbered([name for one in several for name in one.extras])
+    extras = {
+        name: tuple(text for one in several for text in one.extras.get(name, ("",) * len(one)))
+        for name in names
+    }
     arrays: dict[str, Any] = {
         name: None if part[0] is None else np.concatenate(part) for name, part in parts.items()
     }
@@ -63,6 +68,8 @@ def joined(several: Sequence[Readings]) -> Readings:
             for name in one.sessions
         ),
         findings=tuple(finding for one in several for finding in one.findings),
+        on_base=frozenset(name for one in several for name in one.on_base),
+        extras=extras,
         **arrays,
     )
     return _each_once(whole)
@@ -129,7 +136,12 @@ def _facts(readings: Readings) -> dict[str, str]:
         facts["robot"] = one.robot.casefold()
     if one.sigma_turn is not None:
         facts["sigma_deg"] = f"{one.sigma_turn / DEG:.6g}"
+    facts |= {f"mounting of target {name}": _mounting(one, name) for name in one.targets}
     return facts | {f"place of target {name}": number_texts(place / MM) for name, place in one.places.items()}
+
+
+def _mounting(readings: Readings, name: str) -> str:
+    return "on the base" if name in readings.on_base else "on the flange"
 
 
 def _named(readings: Readings) -> str:

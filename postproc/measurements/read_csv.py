@@ -25,12 +25,14 @@ def read_measurements(path: Path, joints: Sequence[tuple[str, bool]]) -> Reading
 
     Raises Refusal: FIL001..FIL003 (no text), MEA001 (comments, header or rows are wrong), MEA002 (no readings yet).
     """
-    axes, table, deflection, ignored = split_columns(read_table(path, "MEA001"), joints)
+    axes, table, deflection, extra = split_columns(read_table(path, "MEA001"), joints)
     stated = stated_in(table)
     findings = list(stated.findings)
-    if ignored:
-        these = "these columns are" if len(ignored) > 1 else "this column is"
-        message = f"the format has no {', '.join(ignored)}: {these} ignored"
+    if extra.columns:
+        these = "these columns are" if len(extra.columns) > 1 else "this column is"
+        message = (
+            f"the format has no {', '.join(extra.columns)}: {these} ignored, and kept in the CSV of residuals"
+        )
         findings.append(Finding("MEA010", message, str(path), table.header_line))
     if deflection and stated.frame == "tracker":
         message = "# frame: tracker is ignored: DX, DY, DZ are in the axes of the robot base"
@@ -47,7 +49,8 @@ def read_measurements(path: Path, joints: Sequence[tuple[str, bool]]) -> Reading
     names = _names(table, "TARGET", "the name of the target is missing in this row")
     visits = _names(table, "SESSION", "state it in every row, or remove the column", may_be_empty=True)
 
-    lost = _placeholders(value, wrench, deflection)
+    still = np.array([name in stated.on_base for name in names])
+    lost = _placeholders(value, wrench, deflection) & ~(still & deflection)
     if lost.any():
         lines = table.lines[lost]
         message = (
@@ -102,6 +105,8 @@ def read_measurements(path: Path, joints: Sequence[tuple[str, bool]]) -> Reading
         file=np.zeros(len(rows), np.int64),
         line=table.lines[rows],
         findings=tuple(findings),
+        on_base=frozenset(name for name in stated.on_base if name in targets),
+        extras={name: tuple(_of(extra.texts(name), rows)) for name in extra.columns},
     )
     return with_repeats(readings, _of(table.texts("REPEAT"), rows) if "REPEAT" in table else [])
 

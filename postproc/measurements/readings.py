@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from postproc.base.arrays import Floats, Ints, frozen
+from postproc.base.arrays import Bools, Floats, Ints, frozen
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
@@ -30,7 +30,9 @@ class Readings:
 
     ``deflection``: ``value`` is loaded minus unloaded, robot base axes; else the absolute place, in the robot base
     (``in_robot_frame``) or in the tracker's frame.  ``targets``: names of the measured points, () where there is one
-    unnamed point; ``places``: name -> (3,) [m] on the flange, of those that are stated.
+    unnamed point; ``places``: name -> (3,) [m] on the flange, of those that are stated; ``on_base``: names of those
+    that are fixed to the robot base instead, places in its axes.  ``extras``: name -> text (R,) of columns that are no
+    part of the format.
 
     q (R, n) [rad, m] as commanded; wrench (R, 6) [N, N m] at the TCP, robot base axes; value (R, 3) [m], NaN where a
     coordinate is missing; rotation (R, 3, 3) of the pose, or of the turn from unloaded to loaded, NaN where missing,
@@ -68,6 +70,8 @@ class Readings:
     file: Ints
     line: Ints
     findings: tuple[Finding, ...] = ()
+    on_base: frozenset[str] = frozenset()
+    extras: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         n = len(self.joints)
@@ -88,7 +92,15 @@ class Readings:
         """Some of the readings; the names of targets, sessions and files stay."""
         given: dict[str, Any] = {name: getattr(self, name) for name in ARRAYS}
         given = {name: None if values is None else values[rows] for name, values in given.items()}
-        return replace(self, **given)
+        kept = np.arange(len(self))[rows].tolist()
+        extras = {name: tuple(texts[row] for row in kept) for name, texts in self.extras.items()}
+        return replace(self, **given, extras=extras)
+
+    @property
+    def based(self) -> Bools:
+        """(R,) readings of a target on the base."""
+        names = self.targets or ("",)
+        return np.array([name in self.on_base for name in names])[self.target]
 
     def where(self, row: int) -> tuple[str, int]:
         """File and line of a reading; ("", 0) for one of no file."""

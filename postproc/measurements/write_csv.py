@@ -35,6 +35,7 @@ def measurements_csv(readings: Readings, about: Sequence[str] = ()) -> bytes:
         single = repeat < 0
         ids = np.where(single, repeat.max(initial=-1) + np.cumsum(single), repeat)
         columns["REPEAT"] = [str(number + 1) for number in ids]
+    columns |= {name: [as_cell(text) for text in texts] for name, texts in readings.extras.items()}
     stream = io.StringIO()
     for comment in comments:  # in quotes where a spreadsheet would cut a cell with a formula out of it
         quote = '"' if re.search(r"[,;\t][^\S\t]*+[=+@-]", comment) else ""
@@ -68,8 +69,11 @@ def _comments(readings: Readings) -> list[str]:
         comments.append(f"sigma_mm: {sigma / MM:.6g}")
     if readings.sigma_turn is not None:
         comments.append(f"sigma_deg: {readings.sigma_turn / DEG:.6g}")
-    places = readings.places.items()
-    return comments + [f"target {name}: {number_texts(place / MM)}" for name, place in places]
+    nowhere = {name: None for name in sorted(readings.on_base) if name not in readings.places}
+    for name, place in {**readings.places, **nowhere}.items():
+        key = "base_target" if name in readings.on_base else "target"
+        comments.append(f"{key} {name}: {'' if place is None else number_texts(place / MM)}".rstrip())
+    return comments
 
 
 def _state(readings: Readings) -> dict[str, list[str]]:

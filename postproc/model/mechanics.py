@@ -10,7 +10,7 @@ import numpy as np
 from postproc.base.arrays import Floats, frozen
 from postproc.base.geometry import Poses
 from postproc.effects import ChainState, ComplianceLaw, Conditions, Effect, Load, Offset, Values
-from postproc.robot.chain import Chain, generalized_force
+from postproc.robot.chain import Chain, add_to_leaders, generalized_force
 from postproc.robot.description import Robot, Value
 
 STILL = 1e-9
@@ -150,9 +150,17 @@ class Mechanics:
     def loaded(self, state: ChainState, pushed: Floats) -> tuple[Floats, Floats]:
         """As ``forces``, two (m, N), where ``pushed`` (m, N) [N m, N] is what the wrench does alone."""
         force, slope = pushed.copy(), np.zeros_like(pushed)
+        if not self.chain.couplings:
+            for load, values in self.loads:
+                load.add_force(values, state, force, slope)
+            return force, slope
+        own = np.zeros_like(pushed)
         for load, values in self.loads:
-            load.add_force(values, state, force, slope)
-        return force, slope
+            load.add_force(values, state, own, slope)
+        add_to_leaders(own, self.chain.couplings)
+        for row, leader, ratio in self.chain.couplings:
+            slope[leader] += ratio * ratio * slope[row]
+        return force + own, slope
 
     def displacement(self, state: ChainState, force: Floats) -> tuple[Floats, Floats]:
         """Displacement (m, N) [rad, m] by all laws under ``force`` (m, N) [N m, N], and its derivative (m, N),

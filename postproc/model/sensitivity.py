@@ -37,7 +37,7 @@ def compute_sensitivity(
         moved = ((high - low) / (ends[1] - ends[0])).T
         if isinstance(effect, Load):
             moved = gives.T * moved
-        elif isinstance(effect, Offset):
+        elif isinstance(effect, Offset) and any(load.by_rest for load, _ in model.loads):
             if by_rest is None:
                 by_rest = gives.T[:, :, None] * compute_curvature(model, state, tool, every, True, force)
             moved = moved + (by_rest @ moved[:, :, None])[:, :, 0]

@@ -200,6 +200,11 @@ def _values(
     _turn_approaches(motions, places, rows, tangent)
     lines = [_lever(state.swept, i) for i in range(model.chain.size)]
     turns = [axis if turn else None for axis, turn in zip(state.swept.axes, state.swept.turns, strict=True)]
+    for row, leader, ratio in model.chain.couplings:
+        lines[leader] = lines[leader] + ratio * lines[row]
+        more, own = turns[row], turns[leader]
+        if more is not None:
+            turns[leader] = ratio * more if own is None else own + ratio * more
     gives = model.compliance(state).T
     start = np.zeros((3, len(angles)))
     if scoring.unloaded:

@@ -39,6 +39,10 @@ USUAL = 10.0
 """An effect that only shows beyond so many times its usual size was hardly tested."""
 
 
+HANGS = 0.996
+"""Cosine of a force with straight down from which on it is a weight that hangs: 5 degrees."""
+
+
 @dataclass(frozen=True, eq=False)
 class NextPoses:
     """Poses worth measuring next: they distinguish the explanations ``between``.  readings: still to be taken;
@@ -53,10 +57,17 @@ class NextPoses:
 
     @property
     def poses(self) -> list[dict[str, float]]:
-        """Axes [deg, mm] and weight [kg] of each, and the sense in which each axis comes there, where that counts."""
+        """Axes [deg, mm] and weight [kg] of each, the force [N] where it is a pull, and the sense in which each axis
+        comes there, where that counts."""
         readings = self.readings
         table = {axis.name: axis.values.round(4) for axis in joint_variables(readings)}
-        table["load_kg"] = (np.linalg.norm(readings.wrench[:, :3], axis=1) / STANDARD_GRAVITY).round(4)
+        force = readings.wrench[:, :3]
+        size = np.linalg.norm(force, axis=1)
+        hangs = -force[:, 2] >= HANGS * size
+        table["load_kg"] = np.where(hangs, size / STANDARD_GRAVITY, 0.0).round(4)
+        if not hangs.all():
+            pull = np.where(hangs[:, None], 0.0, force).round(2)
+            table |= dict(zip(("pull_x_n", "pull_y_n", "pull_z_n"), pull.T, strict=True))
         if readings.direction is not None:
             table |= {f"DIR{i}": column for i, column in enumerate(readings.direction.T, 1)}
         rows = np.column_stack(list(table.values())) + 0.0
@@ -91,7 +102,8 @@ class Diagnosed(Result):
     """The result of ``diagnose``.
 
     data: name and SHA-256 of each file; held_out_before, held_out_after (R, 3) [m]: residuals of each pose by fits
-    without this pose, of the robot file as it is and of the final model; robot_file, next_poses_file: as written, None
+    without this pose, of the robot file as it is and of the final model; load_limits: which loads next poses do not
+    propose, in words; robot_file, next_poses_file: as written, None
     where not; outputs: all files written.
     """
 
@@ -111,6 +123,7 @@ class Diagnosed(Result):
     outputs: tuple[str, ...] = ()
     strict: bool = False
     validation: tuple[ValidatedFile, ...] = ()
+    load_limits: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
@@ -350,6 +363,8 @@ def _placed(one: Placed, kind: str) -> dict[str, object]:
     if one.angles is not None and one.angles_ci95 is not None:
         entry |= {axis: float(v) for axis, v in zip("abc", one.angles, strict=True)}
         entry |= {f"r{axis}_ci95": float(v) for axis, v in zip("xyz", one.angles_ci95, strict=True)}
+    if kind == "target":
+        entry["on_base"] = one.on_base
     return entry
 
 

@@ -122,12 +122,13 @@ def evidence_table(result: Diagnosed, verbose: bool) -> Table:
     )
     for named in result.verdict.named:
         its = named.evidence
-        numbers = (its.heldout, its.regions, its.sessions, its.margin)
+        numbers = (its.heldout, its.regions, its.sessions)
         nearest = "" if its.alias is None else f"next: {its.alias.label}"
         cells = [
             _number(its.gain),
             f"{its.chance:.1g}" if its.chance > LEAST_CHANCE else "< 1e-99",
             *map(_number, numbers),
+            _number(its.margin) if its.margin > 0 else "none",
         ]
         table.add_row(named.candidate.label, *cells, nearest)
     for candidate, why in result.verdict.rejected:

@@ -166,7 +166,7 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
     if planned is None:
         yield (
             "No pose within the limits, with the loads used so far, distinguishes them better than the scatter: other"
-            " loads or targets may."
+            f" loads or targets may{_limited(result)}."
         )
         return
     first, second = (candidate.label for candidate in planned.between)
@@ -175,7 +175,7 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
         yield (
             f"The best {count(len(planned.poses), 'pose')} with the loads used so far would not distinguish them: there"
             f" {first} and {second} differ by {apart:.1f} standard deviations, {SETTLES:.1f} are required. Other loads"
-            " or targets, or less scatter, may."
+            f" or targets, or less scatter, may{_limited(result)}."
         )
         return
     where = f" ({result.next_poses_file})" if result.next_poses_file else ""
@@ -188,6 +188,11 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
             f"They leave the ranges measured so far of {listed(planned.beyond)}, within which nothing distinguishes"
             " the two: check that the arm, its cables and the target are free there."
         )
+
+
+def _limited(result: Diagnosed) -> str:
+    """Which loads are not proposed."""
+    return f" ({'; '.join(result.load_limits)})" if result.load_limits else ""
 
 
 def _unknown(result: Diagnosed) -> Iterator[str]:
@@ -222,11 +227,11 @@ def _class_of_geometry(result: Diagnosed) -> Iterator[str]:
         e for e in result.final.estimates if e.unknown.gauge and e.ci95 > WIDE * (e.unknown.prior or np.inf)
     ]
     if hidden and any(one.candidate.joint == EVERY for one in result.verdict.named):
-        names = listed([e.unknown.parameter.name for e in hidden[:PARAMETERS]])
-        more = f" and {len(hidden) - PARAMETERS} more" if len(hidden) > PARAMETERS else ""
+        names = [e.unknown.parameter.name for e in hidden[:PARAMETERS]]
+        more = [f"{len(hidden) - PARAMETERS} more"] if len(hidden) > PARAMETERS else []
         yield (
             "Some lengths, twists and zeros predict the same together: the values are the smallest plausible ones, and"
-            f" their intervals hold all others; the readings hardly determine {names}{more} alone."
+            f" their intervals hold all others; the readings hardly determine {listed([*names, *more])} alone."
         )
 
 
@@ -269,8 +274,9 @@ def _fixed(named: Named) -> str:
 
 def noun(named: Named) -> str:
     """What the effect is, and where."""
-    joints = listed(named.joints) if named.joints else "the joints" if named.candidate.joint == EVERY else ""
-    return NOUNS[named.effect].format(joints=joints)
+    last = named.candidate.up_to_joint
+    whole = f"the joints up to {last}" if last else "the joints"
+    return NOUNS[named.effect].format(joints=listed(named.joints) if named.joints else whole)
 
 
 def _parameters(named: Named) -> str:

@@ -114,6 +114,20 @@ class Identified(Result):
         residuals = {"before": self.validation.before, "after": self.validation.after}
         return {name: lengths_of(values, measured) for name, values in residuals.items()}
 
+    @cached_property
+    def validated_files(self) -> list[tuple[str, dict[str, Floats]]]:
+        """Path of each file to validate with, and the lengths (V,) [m] of its readings before and after."""
+        if self.validation is None:
+            return []
+        readings = self.validation.campaign.readings
+        return [
+            (
+                str(path),
+                {name: values[readings.file == k] for name, values in self.validation_lengths.items()},
+            )
+            for k, path in enumerate(readings.files)
+        ]
+
     def gap_mm(self) -> dict[str, float]:
         """Root mean squares of residuals, and the scatter of the readings; what is not known is omitted."""
         return gap_of(self.lengths, self.after.noise)
@@ -295,10 +309,11 @@ class Identified(Result):
             "readings": len(self.validation.campaign),
             "registration_refitted": self.validation.registered_anew,
         }
-        for name, lengths in self.validation_lengths.items():
-            size = Sizes.of(lengths)
-            for key in ("rms", "mean", "max"):
-                entry[f"{name}_{key}_mm"] = mm(getattr(size, key)) if size else None
+        entry |= _sizes(self.validation_lengths)
+        entry["files"] = [
+            {"file": file, "readings": len(lengths["before"]), **_sizes(lengths)}
+            for file, lengths in self.validated_files
+        ]
         return entry
 
     def _residuals(self) -> dict[str, object]:
@@ -348,3 +363,13 @@ def identified_csv(result: Identified) -> bytes:
         "fitted": [str(int(counts)) for counts in result.counts],
     }
     return residuals_csv(result.after.campaign, residuals, more)
+
+
+def _sizes(named: Mapping[str, Floats]) -> dict[str, object]:
+    """Root mean square, mean and largest [mm] of ``named`` lengths (R,) [m]."""
+    entry: dict[str, object] = {}
+    for name, lengths in named.items():
+        size = Sizes.of(lengths)
+        for key in ("rms", "mean", "max"):
+            entry[f"{name}_{key}_mm"] = mm(getattr(size, key)) if size else None
+    return entry

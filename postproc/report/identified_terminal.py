@@ -179,6 +179,9 @@ def residual_table(result: Identified) -> Table:
     anew = ", registration refitted" if result.validation and result.validation.registered_anew else ""
     named = {f"validation{anew}, {name}": lengths for name, lengths in result.validation_lengths.items()}
     add_sizes(table, named)
+    if len(result.validated_files) > 1:
+        for file, lengths in result.validated_files:
+            add_sizes(table, {f"{sanitize(file)}, {name}": values for name, values in lengths.items()})
     noise = result.gap_mm().get("noise_mm")
     if noise is not None:
         table.add_row("scatter of the readings", f"{noise:.3f}")

@@ -15,14 +15,15 @@ from postproc.identification.least_squares import prior_rows, prior_weight
 
 class Placed(NamedTuple):
     """``name`` of a session or target; position (3,) [mm] and angles (3,) [deg] A, B, C of the robot base in the
-    tracker's frame, or of the target on the flange (angles None); ci95 (3,) [mm], angles_ci95 (3,) [deg]: 95 %
-    intervals."""
+    tracker's frame, or of the target on the flange or, ``on_base``, in the robot base (angles None); ci95 (3,) [mm],
+    angles_ci95 (3,) [deg]: 95 % intervals."""
 
     name: str
     position: Floats
     ci95: Floats
     angles: Floats | None
     angles_ci95: Floats | None
+    on_base: bool = False
 
 
 def stations(fitted: Fit) -> tuple[Placed, ...]:
@@ -44,7 +45,7 @@ def stations(fitted: Fit) -> tuple[Placed, ...]:
 
 
 def targets(fitted: Fit) -> tuple[Placed, ...]:
-    """The targets on the flange whose place is not stated."""
+    """The targets whose place is not stated."""
     campaign, given = fitted.campaign, fitted.point.given
     wide, names, places = _intervals(fitted), campaign.nuisance_names, []
     for k, name in enumerate(campaign.targets):
@@ -52,8 +53,10 @@ def targets(fitted: Fit) -> tuple[Placed, ...]:
         if campaign.place_known[k] or label not in names:
             continue
         at = names.index(label)
-        on_flange = campaign.tool.rotation @ given.places[k] + campaign.tool.position
-        places.append(Placed(name, on_flange / MM, wide[at : at + 3] / MM, None, None))
+        there = given.places[k]
+        if not campaign.on_base[k]:
+            there = campaign.tool.rotation @ there + campaign.tool.position
+        places.append(Placed(name, there / MM, wide[at : at + 3] / MM, None, None, bool(campaign.on_base[k])))
     return tuple(places)
 
 

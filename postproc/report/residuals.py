@@ -120,6 +120,8 @@ def residuals_csv(
             columns[f"{name}_d{axis}_mm"] = fixed_decimals(column / MM, 6)
         columns[f"{name}_mm"] = fixed_decimals(lengths_of(residual, measured) / MM, 6)
     columns |= more
+    for name, texts in readings.extras.items():
+        columns[name if name not in columns else f"{name} (as measured)"] = [as_cell(text) for text in texts]
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(columns)

@@ -12,6 +12,9 @@ between them the extra coordinates that a model asks for by name:
 The evaluation works component-wise on arrays with the states in the last, contiguous axis.  The same chain as a model
 of Pinocchio is the reference that it is held against; it is made where it is asked for, as Pinocchio takes longer to
 load than most programs to compensate, and has no wheels for Windows.
+
+A joint without a motor (``Passive``) is a coordinate too.  A linkage or a gear makes it move with the joints that it
+follows, whatever moves these: their motors or a load.  What pushes it therefore pushes them.
 """
 
 from __future__ import annotations
@@ -24,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats
-from postproc.base.geometry import Poses
+from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.robot.geometries import Joint
 
 TOOL = Poses.identity()
@@ -43,7 +46,7 @@ class ChainKinematics:
     shift; apart (m,): it has another origin than the one before it; spindles: how many of them, the last ones, are the
     spindle's; position (3, N) [m] of the TCP; mount (3, N) [m]: the same without what the spindle's coordinates shift
     it, where the tool's body is; flange: three columns (3, N) and position (3, N) [m] of the flange; links: the three
-    columns (3, N) of the frame after each motor.
+    columns (3, N) of the frame after each motor; couplings: as of ``Chain``.
     """
 
     axes: tuple[Floats, ...]
@@ -55,6 +58,7 @@ class ChainKinematics:
     mount: Floats
     flange: tuple[tuple[Floats, ...], Floats]
     links: tuple[tuple[Floats, ...], ...]
+    couplings: tuple[tuple[int, int, float], ...]
     _columns: tuple[Floats, ...]
     _tool: Floats | None
 
@@ -76,6 +80,7 @@ class ChainKinematics:
         w = sum of s_i z_i over the turns; dp = sum of s_i z_i x (p - p_i) over the turns, and of s_i z_i over the
         shifts.  The error has the size of the step's square.
         """
+        step = followed(step, self.couplings)
         turn, shift, spindle_shift = (np.zeros((3, step.shape[1])) for _ in range(3))
         mounted, at = len(self.axes) - self.spindles, 0
         while at < len(self.axes):
@@ -105,8 +110,9 @@ class ChainKinematics:
 class Chain:
     """A serial chain of ``joints`` with a ``flange``, and the extra coordinates named in ``extras``.
 
-    names (m,): of the coordinates; motors: where the joints are among them (a slice without extras).  Raises ValueError
-    where ``extras`` names a coordinate that is not there.
+    names (m,): of the coordinates; motors: where the joints are among them (a slice without extras); couplings: (row of
+    a joint without a motor, row of a joint that it follows, ratio).  Raises ValueError where ``extras`` names a
+    coordinate that is not there.
     """
 
     def __init__(self, joints: Sequence[Joint], flange: Poses, extras: Iterable[str] = ()) -> None:
@@ -116,7 +122,13 @@ class Chain:
         names: list[str] = []
         motors: list[int] = []
         names += self._site("base", wanted)
+        followers: list[tuple[int, tuple[tuple[str, float], ...]]] = []
         for joint in joints:
+            for passive in joint.passive:
+                self._at = self._at @ passive.placement
+                followers.append((len(names), passive.follows))
+                names.append(passive.name)
+                self._add(np.eye(3), passive.kind == "revolute")
             if f"{joint.name}.growth" in wanted:
                 self._add(_z_along(joint.placement.position), turns=False)
                 names.append(f"{joint.name}.growth")
@@ -133,6 +145,9 @@ class Chain:
         if unknown:
             raise ValueError(f"a chain has no coordinates {sorted(unknown)}")
         self.index = {name: i for i, name in enumerate(self.names)}
+        self.couplings = tuple(
+            (row, self.index[name], ratio) for row, follows in followers for name, ratio in follows
+        )
         self.motors = slice(0, len(motors)) if motors == list(range(len(motors))) else np.array(motors)
         self.motor_rows = np.array(motors)
         turns = [*(turns for *_, turns in self._arm), *(name[5] == "r" for name in self._tool)]
@@ -186,6 +201,7 @@ class Chain:
         axes (tool z without it).
         """
         count = coordinates.shape[1]
+        coordinates = followed(coordinates, self.couplings)
         axes: list[Floats] = []
         origins: list[Floats] = []
         # what all states share has one column until a coordinate differs between them
@@ -238,6 +254,7 @@ class Chain:
             mount,
             flange,
             tuple(links),
+            self.couplings,
             _of_all(columns, count),
             beyond,
         )
@@ -256,6 +273,20 @@ class Chain:
             three = [across, np.cross(along, across, axis=0), along]
         return [three["xyz".index(name[-1])] for name in self._spindle]
 
+    def base(self, coordinates: Floats) -> Poses:
+        """Where the robot base is (N) at ``coordinates`` (m, N) [rad, m], in the frame that it has at zero."""
+        count = coordinates.shape[1]
+        rotation, position = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
+        for name in self.names:
+            if not name.startswith("base."):
+                break
+            axis, value = "xyz".index(name[-1]), coordinates[self.index[name]]
+            if name[5] == "r":
+                rotation = rotation @ rotation_from_vector(value[:, None] * np.eye(3)[axis])
+            else:
+                position = position + value[:, None] * rotation[:, :, axis]
+        return Poses(rotation, position)
+
     def placed(self, q: Floats) -> Floats:
         """Coordinates (m, N) of a rigid robot with its motors at ``q`` (N, n) [rad]."""
         coordinates = np.zeros((self.size, len(q)))
@@ -272,10 +303,14 @@ class Chain:
 
 
 def jacobian(swept: ChainKinematics) -> Floats:
-    """Geometric Jacobians (N, 6, m) of the TCP: column [z x (p - p_i); z] of a turn, [z; 0] of a shift."""
+    """Geometric Jacobians (N, 6, m) of the TCP: column [z x (p - p_i); z] of a turn, [z; 0] of a shift; of a joint
+    that others follow, the sum with theirs."""
     turns, axes = swept.turns[:, None, None], np.array(swept.axes)
     lever = np.cross(axes, swept.position[None] - np.array(swept.origins), axis=1)
     linear, angular = np.where(turns, lever, axes), np.where(turns, axes, 0.0)
+    for row, leader, ratio in swept.couplings:
+        linear[leader] += ratio * linear[row]
+        angular[leader] += ratio * angular[row]
     return np.moveaxis(np.concatenate([linear, angular], axis=1), (0, 1, 2), (2, 1, 0))
 
 
@@ -302,7 +337,24 @@ def generalized_force(swept: ChainKinematics, point: Floats, wrench: Floats) -> 
             np.multiply(zx, fx, out=own)
             own += zy * fy
             own += zz * fz
+    add_to_leaders(force, swept.couplings)
     return force
+
+
+def followed(coordinates: Floats, couplings: Sequence[tuple[int, int, float]]) -> Floats:
+    """(m, N) [rad, m] where joints without a motor are, with the ``coordinates`` (m, N) of those that they follow."""
+    if not couplings:
+        return coordinates
+    coordinates = coordinates.copy()
+    for row, leader, ratio in couplings:
+        coordinates[row] += ratio * coordinates[leader]
+    return coordinates
+
+
+def add_to_leaders(force: Floats, couplings: Sequence[tuple[int, int, float]]) -> None:
+    """Add to ``force`` (m, N) [N m, N], in place, on each joint what pushes those that follow it (virtual work)."""
+    for row, leader, ratio in couplings:
+        force[leader] += ratio * force[row]
 
 
 def cross(a: Floats, b: Floats) -> Floats:

@@ -94,6 +94,14 @@ CODES = define(
             action="Correct what the message names.",
             example="A joint whose parent link is not defined.",
         ),
+        "KIN012": Code(
+            "error",
+            "no program is for this arm",
+            meaning="A program places the flange with six axes, and an external one; the robot has another number.",
+            consequence="Its motion is not determined. `identify`, `diagnose` and `plan` work.",
+            action="State an arm of six joints, or of seven with `external:`.",
+            example="A robot file with nine joints and a program.",
+        ),
         "KIN010": Code(
             "warning",
             "kept orientation is not known",

@@ -20,7 +20,7 @@ from postproc.base.yaml_section import YamlSection, parsed, read
 from postproc.robot.chain import Chain
 from postproc.robot.geometries import Axis, Geometry, Joint, KukaVariant, SerialArm
 from postproc.robot.provenance import Identification, correlations, read_identification
-from postproc.robot.read_geometry import geometry_kind, read_axes, read_geometry, unit_factor
+from postproc.robot.read_geometry import driven, geometry_kind, read_geometry, read_joints, unit_factor
 
 COVERAGE = 1.96
 """Half width of a 95 % interval over the standard deviation (normal distribution)."""
@@ -91,7 +91,8 @@ class Robot:
     All values of joints are the controller's (see ``geometries``).  ``external``: column of the joint of seven that a
     program does not place the flange with; it is where the program has the external axis of its name (E1..E6), and
     without one it stays where it was.  ``identified``: runs of the tool that gave it new
-    values, in order.  ``raw``: the bytes of the file.
+    values, in order.  ``raw``: the bytes of the file.  ``rated_payload`` [kg]: the heaviest that it may carry, None
+    where the file does not state it.
     """
 
     name: str
@@ -110,6 +111,7 @@ class Robot:
     external: int | None = None
     masses: tuple[Mass, ...] = ()
     masses_source: str = ""
+    rated_payload: float | None = None
     mechanisms: tuple[Mechanism, ...] = ()
     identified: tuple[Identification, ...] = ()
     raw: bytes = field(default=b"", repr=False)
@@ -129,9 +131,9 @@ class Robot:
         """(N, n) [rad, m] values between the links, from those (N, n) that programs and the pendant show."""
         values = programmed
         for column, axis in enumerate(self.axes):
-            if axis.follows is not None:
+            if axis.interaction is not None:
                 values = values.copy() if values is programmed else values
-                values[:, column] = programmed[:, column] + values[:, axis.follows]
+                values[:, column] = programmed[:, column] + values[:, axis.interaction]
         return values
 
     @cached_property
@@ -140,6 +142,11 @@ class Robot:
         limits = [(joint.lower, joint.upper) for joint in self.joints]
         joints = self.nominal.joints([joint.name for joint in self.joints], limits)
         return Chain(joints, self.nominal.flange())
+
+    @property
+    def is_programmable(self) -> bool:
+        """Whether a program's six axis values, or one pose, say where its joints are."""
+        return len(self.programmed) == 6
 
     @property
     def programmed(self) -> Ints:
@@ -199,6 +206,16 @@ def load_robot(path: Path) -> Robot:
     return robot_of(read(path), path)
 
 
+def check_programmable(robot: Robot) -> None:
+    """Raises Refusal KIN012 for an arm that six axis values do not place."""
+    if not robot.is_programmable:
+        message = (
+            f"{robot.name} has {len(robot.joints)} joints with a motor; programs and maps need six,"
+            " or seven with an external one"
+        )
+        raise Refusal(Finding("KIN012", message, str(robot.path)))
+
+
 def robot_of(raw: bytes, path: Path) -> Robot:
     """The robot of a file ``path`` that holds ``raw``; the file itself need not be there.  Raises Refusal with file,
     line and key."""
@@ -210,6 +227,7 @@ def robot_of(raw: bytes, path: Path) -> Robot:
         "geometry",
         "controller",
         "joints",
+        "rated_payload",
         "masses",
         "effects",
         "mechanisms",
@@ -217,8 +235,9 @@ def robot_of(raw: bytes, path: Path) -> Robot:
     )
     geometry = top.section("geometry")
     kind = geometry_kind(geometry)
-    axes = read_axes(top.section("joints"))
-    arm, others = read_geometry(geometry, kind, axes, top.section("joints"))
+    listed = read_joints(top.section("joints"))
+    axes = driven(listed)
+    arm, others = read_geometry(geometry, kind, listed, top.section("joints"))
     nominal = arm
     if "controller" in top:
         controller = top.section("controller")
@@ -227,7 +246,7 @@ def robot_of(raw: bytes, path: Path) -> Robot:
             raise controller.error(
                 "YML004", f"the controller's geometry must be of the same kind, {kind}", believed
             )
-        nominal, more = read_geometry(controller, kind, axes, top.section("joints"))
+        nominal, more = read_geometry(controller, kind, listed, top.section("joints"))
         others += more
     names = [axis.name for axis in axes]
     limits = [(axis.lower, axis.upper) for axis in axes]
@@ -249,12 +268,25 @@ def robot_of(raw: bytes, path: Path) -> Robot:
         effects=tuple(EffectEntry(section.text("effect"), section) for section in top.sections("effects")),
         axes=axes,
         external=_external(arm),
+        rated_payload=_rated_payload(top),
         masses=_masses(top.section("masses"), names, arm) if "masses" in top else (),
         masses_source=top.section("masses").text("source") if "masses" in top else "",
         mechanisms=_mechanisms(top, names),
         identified=tuple(read_identification(section) for section in top.sections("identified")),
         raw=raw,
     )
+
+
+def _rated_payload(top: YamlSection) -> float | None:
+    if "rated_payload" not in top:
+        return None
+    section = top.section("rated_payload")
+    section.only("value", "unit", "source")
+    section.text("source")
+    value = section.number("value") * unit_factor(section, "kg")
+    if value <= 0:
+        raise section.error("YML004", "must be above 0", "value")
+    return value
 
 
 def _external(arm: Geometry) -> int | None:

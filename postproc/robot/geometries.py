@@ -6,8 +6,8 @@ into the frames of the joints once, here, so that no other place has to know of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -19,11 +19,23 @@ Limits = Sequence[tuple[float, float]]
 
 
 @dataclass(frozen=True)
+class Passive:
+    """A joint without a motor, which a linkage or a gear turns or moves: by the sum of ratio * value over the joints
+    that it ``follows``, by name [rad, m, each per that of the other].  ``placement`` and ``kind`` as of ``Joint``."""
+
+    name: str
+    placement: Poses
+    follows: tuple[tuple[str, float], ...]
+    kind: str = "revolute"
+
+
+@dataclass(frozen=True)
 class Joint:
     """A joint that turns about (``revolute``) or moves along (``prismatic``) the z axis of its own frame.
 
     ``placement``: that frame in the frame of the joint before (of the base for the first), at value zero.
-    ``lower``, ``upper`` [rad, m].
+    ``lower``, ``upper`` [rad, m].  ``passive``: joints without a motor between the joint before and this one, whose
+    ``placement`` is then in the frame of the last of them.
     """
 
     name: str
@@ -31,14 +43,26 @@ class Joint:
     lower: float
     upper: float
     kind: str = "revolute"
+    passive: tuple[Passive, ...] = ()
+
+
+@dataclass(frozen=True)
+class Follower:
+    """A joint of a geometry that has no motor: its value is the sum of ratio * value over the joints that it
+    ``follows``, as their controller counts them, plus ``offset`` [rad, m]."""
+
+    name: str
+    follows: tuple[tuple[str, float], ...]
+    offset: float = 0.0
+    kind: str = "revolute"
 
 
 @dataclass(frozen=True)
 class Axis:
     """A joint as its controller counts it: sign * value + offset is the angle or the travel of the geometry [rad, m].
     ``speed`` [rad/s, m/s]: the fastest that it moves, None where the file does not state it.
-    ``follows``: column of the joint to whose value programs do not count that of this one: the value between the links
-    is the programmed one plus that of the joint it follows (J3 of a Fanuc, which counts from the level); None without.
+    ``interaction``: column of the joint whose value programs leave out of that of this one: the value between the links
+    is the programmed one plus that of that joint (J3 of a Fanuc, which counts from the level); None without.
     """
 
     name: str
@@ -48,7 +72,10 @@ class Axis:
     sign: float = 1.0
     offset: float = 0.0
     speed: float | None = None
-    follows: int | None = None
+    interaction: int | None = None
+
+
+NO_FOLLOWERS: Mapping[int, Follower] = {}
 
 
 @dataclass(frozen=True)
@@ -153,10 +180,10 @@ class KukaVariant:
 
 @dataclass(frozen=True, eq=False)
 class SerialArm:
-    """Any other arm of six joints, or of seven of which one is ``fixed`` (its column) and the
-    others place the flange.
+    """Any other arm; of seven joints one is ``fixed`` (its column) and the others place the flange.
 
-    ``axes``: as the controller counts them; ``chain``: their frames; ``tip``: the flange in the last link's frame.
+    ``axes``: as the controller counts them; ``chain``: the frames of these and of joints without a motor; ``tip``: the
+    flange in the last link's frame; ``followers``: the joints without a motor, by their place in ``chain``.
     """
 
     kind: str
@@ -164,15 +191,17 @@ class SerialArm:
     chain: tuple[Link, ...]
     tip: Poses
     fixed: int | None = None
+    followers: Mapping[int, Follower] = field(default_factory=dict)
 
     def links(self) -> list[Link]:
         return list(self.chain)
 
     def joints(self, names: Sequence[str], limits: Limits) -> tuple[Joint, ...]:
-        return _folded(self.links(), _renamed(self.axes, names, limits))
+        return _folded(self.links(), _renamed(self.axes, names, limits), self.followers)
 
     def link_frames(self) -> list[Poses]:
-        return _link_frames(self.links(), self.axes)
+        driven = [link for k, link in enumerate(self.chain) if k not in self.followers]
+        return _link_frames(driven, self.axes)
 
     def flange(self) -> Poses:
         return _frozen(_flip(self.axes[-1]) @ self.chain[-1].after @ self.tip)
@@ -228,18 +257,27 @@ def turn_about(axis: str, angle: float) -> Floats:
     return np.round(rotation) if abs(quarters - round(quarters)) < 1e-12 else np.asarray(rotation)
 
 
-def _folded(links: Sequence[Link], axes: Sequence[Axis]) -> tuple[Joint, ...]:
+def _folded(
+    links: Sequence[Link], axes: Sequence[Axis], followers: Mapping[int, Follower] = NO_FOLLOWERS
+) -> tuple[Joint, ...]:
     """Joints whose values are the controller's: offset and sense become part of the frames."""
     joints, at = [], Poses.identity()
-    for link, axis in zip(links, axes, strict=True):
-        if axis.kind == "prismatic":
-            zero = Poses(np.eye(3), np.array([0.0, 0.0, axis.offset]))
+    passive: list[Passive] = []
+    driven = iter(axes)
+    for k, link in enumerate(links):
+        one = followers[k] if k in followers else next(driven)
+        if one.kind == "prismatic":
+            zero = Poses(np.eye(3), np.array([0.0, 0.0, one.offset]))
         else:
-            zero = Poses(turn_about("z", axis.offset), np.zeros(3))
-        flip = _flip(axis)
+            zero = Poses(turn_about("z", one.offset), np.zeros(3))
+        if isinstance(one, Follower):
+            passive.append(Passive(one.name, _frozen(at @ link.before @ zero), one.follows, one.kind))
+            at = link.after
+            continue
+        flip = _flip(one)
         placement = _frozen(at @ link.before @ zero @ flip)
-        joints.append(Joint(axis.name, placement, axis.lower, axis.upper, axis.kind))
-        at = flip @ link.after
+        joints.append(Joint(one.name, placement, one.lower, one.upper, one.kind, tuple(passive)))
+        at, passive = flip @ link.after, []
     return tuple(joints)
 
 

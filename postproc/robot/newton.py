@@ -17,7 +17,7 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.geometry import Poses, rotation_from_vector, vector_from_rotation
 from postproc.robot.chain import TOOL, Chain, jacobian
-from postproc.robot.geometries import SerialArm
+from postproc.robot.geometries import Joint, SerialArm
 
 TOLERANCE = 5e-13
 """[m, rad] what may be left of a solved pose."""
@@ -47,20 +47,20 @@ class Solver:
         self.free = np.array([i for i in range(len(joints)) if i != arm.fixed])
         self.low, self.high = arm.limits.T
         self.turns = np.array([joint.kind == "revolute" for joint in joints])
-        places = [joint.placement.position for joint in joints[1:]] + [arm.flange().position]
-        self.size = float(sum(np.linalg.norm(place) for place in places))
+        lengths = [_length(joint) for joint in joints[1:]] + [float(np.linalg.norm(arm.flange().position))]
+        self.size = sum(lengths)
         self.first = int(self.free[0])
-        after = [np.linalg.norm(place) for place in places[self.first :]]
+        after = lengths[self.first :]
         travels = np.maximum(np.abs(self.low), np.abs(self.high))[self.first :]
         self.reach = float(sum(after) + travels[~self.turns[self.first :]].sum())
 
     def residual(self, q: Floats, target: Poses) -> tuple[Floats, Floats]:
         """What remains to the targets, e (N, 6), and the Jacobian (N, 6, k) of the moving columns, both scaled."""
-        swept = self.chain.evaluate(np.ascontiguousarray(q.T), TOOL)
+        swept = self.chain.evaluate(self.chain.placed(q), TOOL)
         here = swept.pose
         turn = vector_from_rotation(target.rotation @ np.swapaxes(here.rotation, 1, 2))
         error = np.concatenate([(target.position - here.position) / self.size, turn], axis=1)
-        slope = jacobian(swept)[:, :, self.free]
+        slope = jacobian(swept)[:, :, self.chain.motor_rows[self.free]]
         slope[:, :3] /= self.size
         return error, slope
 
@@ -104,14 +104,14 @@ class Solver:
     def beyond(self, q: Floats, target: Poses) -> Bools:
         """(N,) ``target`` (N) is farther from the first joint that moves than all links and travels after it together;
         ``q`` (N, n) states where that joint is."""
-        swept = self.chain.evaluate(np.ascontiguousarray(q.T), TOOL)
-        away = np.linalg.norm(target.position - swept.origins[self.first].T, axis=1)
+        swept = self.chain.evaluate(self.chain.placed(q), TOOL)
+        away = np.linalg.norm(target.position - swept.origins[self.chain.motor_rows[self.first]].T, axis=1)
         return np.asarray(away > 1.001 * self.reach)
 
     def follow(self, q: Floats, target: Poses, stride: float = STEP) -> tuple[Floats, Bools, Bools]:
         """Joint values (N, n) and where (N,) they hold, as ``solve``, along the straight path from where the flange is
         at ``q`` (N, n), in steps of ``stride``; third (N,), where no step failed along the path."""
-        swept = self.chain.evaluate(np.ascontiguousarray(q.T), TOOL)
+        swept = self.chain.evaluate(self.chain.placed(q), TOOL)
         here = swept.pose
         translation = target.position - here.position
         turn = vector_from_rotation(target.rotation @ np.swapaxes(here.rotation, 1, 2))
@@ -167,6 +167,12 @@ class Solver:
     def within(self, q: Floats) -> Bools:
         """(N,) all joints of ``q`` (N, n) [rad, m] are within their limits."""
         return np.asarray(((q >= self.low - 1e-9) & (q <= self.high + 1e-9)).all(axis=1))
+
+
+def _length(joint: Joint) -> float:
+    """[m] from the joint before to this one, at most."""
+    places = [joint.placement, *(passive.placement for passive in joint.passive)]
+    return float(sum(np.linalg.norm(place.position) for place in places))
 
 
 @lru_cache(maxsize=16)
@@ -285,8 +291,8 @@ def weakest(arm: SerialArm, q: Floats) -> Floats:
     """(N,) smallest singular value of the Jacobian of the moving joints at ``q`` (N, n) [rad, m], lengths as parts of
     the arm's size."""
     solver = solver_of(arm)
-    swept = solver.chain.evaluate(np.ascontiguousarray(np.nan_to_num(q).T), TOOL)
-    slope = jacobian(swept)[:, :, solver.free]
+    swept = solver.chain.evaluate(solver.chain.placed(np.nan_to_num(q)), TOOL)
+    slope = jacobian(swept)[:, :, solver.chain.motor_rows[solver.free]]
     slope[:, :3] /= solver.size
     return np.asarray(np.linalg.svd(slope, compute_uv=False)[:, -1])
 

@@ -17,6 +17,7 @@ from postproc.base.yaml_section import YamlSection
 from postproc.robot.geometries import (
     Axis,
     DhRow,
+    Follower,
     Geometry,
     KukaLengths,
     KukaVariant,
@@ -50,9 +51,15 @@ def geometry_kind(section: YamlSection) -> str:
 
 
 def read_geometry(
-    section: YamlSection, kind: str, axes: tuple[Axis, ...], joints: YamlSection
+    section: YamlSection, kind: str, listed: tuple[Axis | Follower, ...], joints: YamlSection
 ) -> tuple[Geometry, list[Path]]:
-    """The geometry of a section, and the files it was read from beside this one."""
+    """The geometry of a section with the joints that are ``listed``, and the files it was read from beside this one."""
+    axes = driven(listed)
+    followers = {k: one for k, one in enumerate(listed) if isinstance(one, Follower)}
+    if followers and kind in ("kuka", "urdf"):
+        why = "the URDF states it with <mimic>" if kind == "urdf" else "a kuka geometry has none"
+        name = next(iter(followers.values())).name
+        raise joints.error("YML004", f"a joint that follows others has no meaning here: {why}", name)
     if kind == "kuka":
         return _kuka(section, axes, joints), []
     read: list[Path] = []
@@ -64,18 +71,29 @@ def read_geometry(
         arm = read_urdf(path, *(given.text(key) if key in given else None for key in ("base", "tip")))
         read, tip = [path], arm.tip
         links: Sequence[Link] = arm.links
-        for axis, name, moves in zip(axes, arm.names, arm.kinds, strict=False):
-            if axis.kind != moves:
-                raise joints.error("YML004", f"is {axis.kind}, {name} of the URDF is {moves}", axis.name)
+        moving = [k for k in range(len(arm.names)) if k not in arm.mimics]
+        _check_count(joints, axes, len(moving))
+        for axis, k in zip(axes, moving, strict=True):
+            if axis.kind != arm.kinds[k]:
+                message = f"is {axis.kind}, {arm.names[k]} of the URDF is {arm.kinds[k]}"
+                raise joints.error("YML004", message, axis.name)
+        named = dict(zip((arm.names[k] for k in moving), axes, strict=True))
+        for k, mimic in arm.mimics.items():
+            leader = named[mimic.joint]
+            ratio, offset = mimic.multiplier * leader.sign, mimic.multiplier * leader.offset + mimic.offset
+            followers[k] = Follower(arm.names[k], ((leader.name, ratio),), offset, arm.kinds[k])
     else:
         rows = _table(section.section(kind))
         links = standard_dh(rows) if kind == "dh" else modified_dh(rows)
-    _check_count(joints, axes, len(links))
-    if len(axes) not in (6, 7):
-        raise section.error("YML004", f"{len(axes)} joints are given; an arm has 6 or 7", kind)
+    _check_count(joints, axes, len(links) - len(followers))
+    if len(links) - 1 in followers:
+        name = followers[len(links) - 1].name
+        raise joints.error(
+            "YML004", f"{name} follows other joints and is the last one; the flange is its link"
+        )
     links = based(links, _frame(section, "base"))
     tip = tip @ _frame(section, "flange")
-    return SerialArm(kind, axes, links, tip, _fixed_joint(axes, joints)), read
+    return SerialArm(kind, axes, links, tip, _fixed_joint(axes, joints), followers), read
 
 
 def _kuka(section: YamlSection, axes: tuple[Axis, ...], joints: YamlSection) -> Geometry:
@@ -152,11 +170,17 @@ def beside(section: YamlSection) -> Path:
     return path
 
 
-def read_axes(section: YamlSection) -> tuple[Axis, ...]:
-    """The joints in the order of the chain: [lower, upper], or {limits, kind, unit, sign, offset, speed}."""
+def driven(listed: Sequence[Axis | Follower]) -> tuple[Axis, ...]:
+    """The joints that have a motor."""
+    return tuple(one for one in listed if isinstance(one, Axis))
+
+
+def read_joints(section: YamlSection) -> tuple[Axis | Follower, ...]:
+    """The joints in the order of the chain: [lower, upper], or {limits, kind, unit, sign, offset, speed}; of one
+    without a motor {follows, kind, unit, offset}."""
     section.text("source")
     factor = unit_factor(section, "rad")
-    axes: list[Axis] = []
+    listed: list[Axis | Follower] = []
     for name in section:
         if name in ("source", "unit", "external"):
             continue
@@ -164,19 +188,43 @@ def read_axes(section: YamlSection) -> tuple[Axis, ...]:
             raise section.error(
                 "YML002", "is not a name of a joint; write a letter, then letters, digits, _", name
             )
-        axes.append(_axis(section, name, factor, [axis.name for axis in axes]))
-    _check_order(section, [axis.name for axis in axes])
-    return tuple(axes)
+        follows = not section.is_list(name) and "follows" in section.section(name)
+        before = [axis.name for axis in driven(listed)]
+        listed.append(_follower(section, name, factor) if follows else _axis(section, name, factor, before))
+    _check_order(section, [one.name for one in listed])
+    names = [axis.name for axis in driven(listed)]
+    for one in listed:
+        for leader, _ in one.follows if isinstance(one, Follower) else ():
+            if leader not in names:
+                what = nearest(leader, names) or ": it must have a motor"
+                raise section.section(one.name).error("YML004", f"{leader!r} is no joint{what}", "follows")
+    return tuple(listed)
+
+
+def _follower(section: YamlSection, name: str, factor: float) -> Follower:
+    """Ratios are rad per rad, m per m, and m per rad or rad per m where the two are of different kinds."""
+    given = section.section(name)
+    given.only("follows", "kind", "unit", "offset")
+    kind = given.text("kind", "revolute", ("revolute", "prismatic"))
+    if kind == "prismatic" or "unit" in given:
+        factor = unit_factor(given, "m" if kind == "prismatic" else "rad")
+    ratios = given.section("follows")
+    follows = tuple((leader, ratios.number(leader)) for leader in ratios)
+    if not follows:
+        raise given.error("YML003", "names no joint; write follows: {A2: -1}", "follows")
+    return Follower(name, follows, given.number("offset", 0.0) * factor, kind)
 
 
 def _axis(section: YamlSection, name: str, factor: float, before: list[str]) -> Axis:
     if section.is_list(name):
         given, key, kind, sign, offset = section, name, "revolute", 1.0, 0.0
-        speed, follows = None, None
+        speed, interaction = None, None
     else:
         given, key = section.section(name), "limits"
-        given.only("limits", "kind", "unit", "sign", "offset", "speed", "follows")
-        follows = before.index(given.text("follows", choices=before)) if "follows" in given else None
+        given.only("limits", "kind", "unit", "sign", "offset", "speed", "interaction")
+        interaction = (
+            before.index(given.text("interaction", choices=before)) if "interaction" in given else None
+        )
         kind = given.text("kind", "revolute", ("revolute", "prismatic"))
         if kind == "prismatic" or "unit" in given:
             factor = unit_factor(given, "m" if kind == "prismatic" else "rad")
@@ -196,9 +244,9 @@ def _axis(section: YamlSection, name: str, factor: float, before: list[str]) -> 
         raise given.error("YML004", "an axis limit or offset exceeds 1000 deg; is it the right unit?", at)
     if kind == "prismatic" and max(largest, abs(offset)) > MAX_TRAVEL:
         raise given.error("YML004", "an axis limit or offset exceeds 200 m; is it the right unit?", at)
-    if follows is not None and kind != "revolute":
-        raise given.error("YML004", "only a revolute joint can follow another one", "follows")
-    return Axis(name, lower * factor, upper * factor, kind, sign, offset, speed, follows)
+    if interaction is not None and kind != "revolute":
+        raise given.error("YML004", "only revolute joints have an interaction", "interaction")
+    return Axis(name, lower * factor, upper * factor, kind, sign, offset, speed, interaction)
 
 
 def _check_order(section: YamlSection, names: list[str]) -> None:
@@ -227,9 +275,10 @@ def _check_count(section: YamlSection, axes: tuple[Axis, ...], count: int) -> No
 def _fixed_joint(axes: tuple[Axis, ...], section: YamlSection) -> int | None:
     """Column of the joint of seven that the other six do not move."""
     names = [axis.name for axis in axes]
-    if len(axes) == 6:
+    if len(axes) != 7:
         if "external" in section:
-            raise section.error("YML004", "an arm of six joints has no external one", "external")
+            words = f"an arm of {len(axes)} joints has no external one"
+            raise section.error("YML004", words, "external")
         return None
     if "external" in section:
         return names.index(section.text("external", choices=names))

@@ -29,6 +29,15 @@ LONGEST_NAME = 1000
 MOVING = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
 
 
+@dataclass(frozen=True)
+class Mimic:
+    """A joint without a motor: multiplier * value of ``joint`` + offset [rad, m]."""
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
 @dataclass
 class _UrdfJoint:
     name: str
@@ -38,16 +47,19 @@ class _UrdfJoint:
     child: str = ""
     origin: Poses | None = None
     axis: Floats | None = None
+    mimic: Mimic | None = None
 
 
 @dataclass(frozen=True)
 class Arm:
-    """The moving joints from base to tip: ``names``, ``kinds`` and ``links``, and the ``tip`` in the last link."""
+    """The moving joints from base to tip: ``names``, ``kinds`` and ``links``, and the ``tip`` in the last link;
+    ``mimics``: of those without a motor, by their place."""
 
     names: tuple[str, ...]
     kinds: tuple[str, ...]
     links: tuple[Link, ...]
     tip: Poses
+    mimics: dict[int, Mimic]
 
 
 def read_urdf(path: Path, base: str | None = None, tip: str | None = None) -> Arm:
@@ -101,7 +113,9 @@ def _only(path: Path, links: list[str], key: str) -> str:
 
 
 def _merged(path: Path, chain: list[_UrdfJoint]) -> Arm:
-    names, kinds, links = [], [], []
+    names: list[str] = []
+    kinds, links, mimics = [], [], {}
+    leaders = {joint.name for joint in chain if joint.kind != "fixed" and joint.mimic is None}
     at = Poses.identity()
     for joint in chain:
         at = at @ (joint.origin or Poses.identity())
@@ -109,13 +123,18 @@ def _merged(path: Path, chain: list[_UrdfJoint]) -> Arm:
             continue
         axis = np.array([1.0, 0.0, 0.0]) if joint.axis is None else joint.axis
         frame = Poses(frame_with_z(axis), np.zeros(3))
+        if joint.mimic is not None:
+            if joint.mimic.joint not in leaders:
+                words = f"{joint.mimic.joint!r}, which is no driven joint between base and tip"
+                raise _wrong(path, joint.line, f"joint {joint.name} mimics {words}")
+            mimics[len(names)] = joint.mimic
         names.append(joint.name)
         kinds.append(MOVING[joint.kind])
         links.append(Link(at @ frame, frame.inverse()))
         at = Poses.identity()
     if not links:
         raise _wrong(path, 0, "no joint between base and tip is movable")
-    return Arm(tuple(names), tuple(kinds), tuple(links), at)
+    return Arm(tuple(names), tuple(kinds), tuple(links), at, mimics)
 
 
 def _parse(path: Path) -> tuple[list[_UrdfJoint], dict[str, int]]:
@@ -192,7 +211,9 @@ def _joint(path: Path, line: int, words: dict[str, str], names: set[str]) -> _Ur
 
 def _detail(path: Path, line: int, joint: _UrdfJoint, tag: str, words: dict[str, str]) -> None:
     if tag == "mimic":
-        raise _wrong(path, line, f"joint {joint.name} mimics another one, so the arm is not serial")
+        factor = _number(path, line, words.get("multiplier", "1"))
+        offset = _number(path, line, words.get("offset", "0"))
+        joint.mimic = Mimic(_word(path, line, tag, words, "joint"), factor, offset)
     if tag in ("parent", "child"):
         setattr(joint, tag, _word(path, line, tag, words, "link"))
     elif tag == "origin":
@@ -236,6 +257,16 @@ def _word(path: Path, line: int, tag: str, words: dict[str, str], key: str) -> s
     if not words.get(key):
         raise _wrong(path, line, f"<{tag}> has no {key!r}")
     return words[key]
+
+
+def _number(path: Path, line: int, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise _wrong(path, line, f"{text[:60]!r} is not a number")
+    return value
 
 
 def _three(path: Path, line: int, text: str) -> Floats:

@@ -135,8 +135,8 @@ def diagnose_schema() -> Schema:
             ),
             "next_poses": array(
                 by_name(
-                    quantity("as in name", "deg, mm or kg; DIR columns: -1, 0, +1"),
-                    "one pose: axes, load, direction of approach",
+                    quantity("as in name", "deg, mm, kg or N; DIR columns: -1, 0, +1"),
+                    "one pose: axes, load, pull if there is one, direction of approach",
                 ),
                 "poses to measure next",
                 nullable=True,
@@ -170,8 +170,12 @@ def diagnose_schema() -> Schema:
                 record(
                     {
                         "target": word("name of the target"),
-                        **{axis: quantity("mm", "place on the flange") for axis in "xyz"},
+                        **{
+                            axis: quantity("mm", "place on the flange, or in the robot base")
+                            for axis in "xyz"
+                        },
                         **{f"{axis}_ci95": quantity("mm", "95 % interval") for axis in "xyz"},
+                        "on_base": boolean("whether it is fixed to the robot base instead of the flange"),
                     },
                     "one target",
                 ),

@@ -105,6 +105,12 @@ def identify_schema() -> Schema:
                         "whether the positions of tracker and targets are fitted to them"
                     ),
                     **validation,
+                    "files": array(
+                        record(
+                            {"file": word("path"), "readings": integer("readings"), **validation}, "one file"
+                        ),
+                        "the same of each file",
+                    ),
                 },
                 "residuals of other measurements, which are not fitted",
                 nullable=True,

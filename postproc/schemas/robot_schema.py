@@ -87,7 +87,7 @@ def _axis(kind: str, si_unit: str, required: tuple[str, ...]) -> Schema:
             "unit": text(choices=words_for(si_unit)),
             "sign": {"enum": [1, -1]},
             "offset": number(),
-            "follows": text("the joint before on top of whose value programs count this one"),
+            "interaction": text("the joint before on top of whose value programs count this one"),
         },
         ["limits", *required],
     )
@@ -100,13 +100,23 @@ _JOINTS = mapping(
         "external": text("the joint of seven that the program does not move"),
     },
     ["source", "unit"],
-    "the joints in the order of the chain: [lower, upper], or limits with kind, unit, sign, offset, follows",
+    "the joints in the order of the chain: [lower, upper], or limits with kind, unit, sign, offset, interaction",
     {
         f"^(?!(?:source|unit|external)$){_JOINT}": {
             "anyOf": [
                 numbers(2, 2, "lower and upper limit"),
                 _axis("revolute", "rad", ()),
                 _axis("prismatic", "m", ("kind", "unit")),
+                mapping(
+                    {
+                        "follows": mapping({}, [], "ratio to each joint that moves it", {_JOINT: number()}),
+                        "kind": {"enum": ["revolute", "prismatic"]},
+                        "unit": text(choices=(*words_for("rad"), *words_for("m"))),
+                        "offset": number(),
+                    },
+                    ["follows"],
+                    "a joint without a motor, which a linkage or a gear moves",
+                ),
             ]
         }
     },
@@ -194,6 +204,11 @@ def robot_schema() -> Schema:
             "effects": listed(
                 {"type": "object", "required": ["effect"], "oneOf": [_effect(name) for name in EFFECTS]},
                 "causes of the arm's deviation from the controller's geometry",
+            ),
+            "rated_payload": mapping(
+                {"value": number(low=0.0), "unit": text(choices=words_for("kg")), "source": _SOURCE},
+                ["value", "unit", "source"],
+                "the heaviest that the robot may carry",
             ),
             "mechanisms": listed(_MECHANISM, "hardware whose effect may or may not be modelled"),
             "identified": listed(_IDENTIFIED),

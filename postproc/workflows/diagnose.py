@@ -30,10 +30,11 @@ from postproc.identification.validation import held_out, validated
 from postproc.measurements import Readings, measurements_csv, read_measurements
 from postproc.model import STANDARD_GRAVITY, approach
 from postproc.output.atomic_write import write_atomically
-from postproc.report.diagnosed import Diagnosed, NextPoses, ValidatedFile, diagnosed_csv
+from postproc.report.diagnosed import HANGS, Diagnosed, NextPoses, ValidatedFile, diagnosed_csv
 from postproc.report.diagnosed_words import SETTLES
 from postproc.report.report import json_bytes
 from postproc.report.residuals import Sizes, lengths_of
+from postproc.robot.description import Robot
 from postproc.workflows.identify import Measured, measured_of
 from postproc.workflows.preparation import Stage, silent
 from postproc.workflows.robot_files import new_robot_file
@@ -45,9 +46,6 @@ NEXT = 6
 
 HARDLY = 0.5
 """Standard deviations between two explanations below which poses are not worth measuring."""
-
-UPRIGHT = 0.996
-"""Cosine of a force with straight down from which on it is a weight that hangs: 5 degrees."""
 
 LOADS = 3
 """Of the weights that were hung, so many different ones are proposed again."""
@@ -71,7 +69,8 @@ CANDIDATES = 300
 @dataclass(frozen=True)
 class DiagnoseRequest:
     """What the user asked for.  ``robot``: None takes the one that the data name; ``next_poses``: where a plan goes
-    that distinguishes explanations, beside ``output`` without it."""
+    that distinguishes explanations, beside ``output`` without it; ``payload_kg``: the heaviest weight to be hung, None
+    that of the robot file; ``pulls``: forces can be pulled with, in any direction and as large as those measured."""
 
     data: tuple[Path, ...]
     robot: str | None = None
@@ -79,6 +78,8 @@ class DiagnoseRequest:
     next_poses: Path | None = None
     validate: tuple[Path, ...] = ()
     tool_mm_deg: tuple[float, ...] | None = None
+    payload_kg: float | None = None
+    pulls: bool = False
     picture: Path | None = None
     page: Path | None = None
     csv: Path | None = None
@@ -113,13 +114,14 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
             for one in wild
         ]
         campaign = diagnosis.final.campaign
+    findings += _searched(diagnosis, request.data[0])
     stage("leaving poses out")
     folds = min(FOLDS, campaign.poses)
     residuals = held_out(diagnosis.stated, folds), held_out(diagnosis.final, folds)
     planned = None
     if diagnosis.verdict.word == "ambiguous" and not diagnosis.agreed:
         stage("looking for poses that settle it")
-        planned = _next_poses(measured, diagnosis)
+        planned = _next_poses(request, measured, diagnosis)
     result = Diagnosed(
         robot=measured.robot.name,
         robot_digest=measured.robot.digest,
@@ -135,9 +137,36 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
         robot_file=None,
         outputs=(),
         strict=request.strict,
+        load_limits=_load_limits(request, measured),
         validation=tuple(_validated(path, measured, diagnosis) for path in request.validate),
     )
     return _published(request, measured, result, stage)
+
+
+def _searched(diagnosis: Diagnosis, file: Path) -> list[Finding]:
+    """What part of the readings effects were searched for in, where that is not all."""
+    some, every = diagnosis.search.base.campaign, campaign_of(diagnosis)
+    if len(some) == len(every):
+        return []
+    message = (
+        f"effects were searched for in {len(some)} of {len(every)} readings ({some.poses} of {every.poses} poses, at"
+        " random); what was found is fitted to all of them"
+    )
+    return [Finding("DIA004", message, str(file))]
+
+
+def _load_limits(request: DiagnoseRequest, measured: Measured) -> tuple[str, ...]:
+    """Why weights or pulls that were measured with are not planned with again."""
+    readings, payload = measured.readings, heaviest(request, measured.robot)
+    hung = hung_weights(readings)
+    words = []
+    if len(within_payload(hung, payload)) < len(hung):
+        words.append(f"weights above the payload of {payload:g} kg are not proposed again")
+    force = np.linalg.norm(readings.wrench[:, :3], axis=1)
+    pulled = (force > 0) & (-readings.wrench[:, 2] < HANGS * force)
+    if pulled.any() and not request.pulls:
+        words.append("pulls are proposed with --pulls only")
+    return tuple(words)
 
 
 def _validated(path: Path, measured: Measured, diagnosis: Diagnosis) -> ValidatedFile:
@@ -195,13 +224,13 @@ def _spare_inputs(request: DiagnoseRequest) -> None:
         raise Refusal(Finding("FIL007", "two results have the same name", str(written[0])))
 
 
-def _next_poses(measured: Measured, diagnosis: Diagnosis) -> NextPoses | None:
+def _next_poses(request: DiagnoseRequest, measured: Measured, diagnosis: Diagnosis) -> NextPoses | None:
     """Poses, of those loads and targets that were used, at which the explanations disagree most; None where none do."""
-    offer = _offer(measured, diagnosis.search.base)
+    offer = _offer(request, measured, diagnosis.search.base)
     # where the arm was it can go again
     narrow = replace(offer, limits=_measured_ranges(measured.readings.q, offer.limits))
-    if measured.readings.deflection and not len(hung_weights(measured.readings)):
-        return None  # only pulls: what can be pulled where is not known
+    if measured.readings.deflection and not len(offer.loads) + len(offer.pulls):
+        return None  # what can be hung or pulled with is not known
     pairs = [(first, other) for first, *others in diagnosis.verdict.alternatives for other in others[:TRIED]]
     for offered in (narrow, offer):
         tried = [_discriminating_poses(measured, diagnosis, offered, one, other) for one, other in pairs]
@@ -261,7 +290,7 @@ def _like(measured: Measured, planned: Readings) -> Readings:
         planned,
         in_robot_frame=before.in_robot_frame,
         tool=before.tool,
-        places=dict(before.places),
+        places={name: place for name, place in before.places.items() if name not in before.on_base},
         time=None if before.time is None else empty,
         temperature=None if before.temperature is None else empty,
         direction=direction,
@@ -277,19 +306,22 @@ def _values(final: Fit, unknowns: Sequence[Unknown], candidate: Candidate) -> di
     return {u.key: fitted[u.parameter.name] for u in unknowns if u.parameter.name in fitted}
 
 
-def _offer(measured: Measured, base: Fit) -> CandidateSetups:
-    """What was measured with: targets, weights, scatter."""
+def _offer(request: DiagnoseRequest, measured: Measured, base: Fit) -> CandidateSetups:
+    """What was measured with: targets, weights within the payload, scatter; and pulls where there can be such."""
     readings, campaign = measured.readings, measured.campaign
     in_flange = campaign.tool.rotation @ base.point.given.places[:, :, None]
-    loads = hung_weights(readings)
+    moving = ~campaign.on_base
+    loads = within_payload(hung_weights(readings), heaviest(request, measured.robot))
+    pulls = pulls_like(readings) if request.pulls else np.zeros((0, 3))
     if len(loads) > LOADS:
         loads = loads[np.linspace(0, len(loads) - 1, LOADS).round().astype(int)]
     return CandidateSetups(
         tool=campaign.tool,
-        targets=readings.targets,
-        places=in_flange[:, :, 0] + campaign.tool.position,
+        targets=tuple(name for name in readings.targets if name not in readings.on_base),
+        places=(in_flange[:, :, 0] + campaign.tool.position)[moving],
         rough=campaign.tracked,
-        loads=loads if len(loads) else np.zeros(1),
+        loads=loads if len(loads) or readings.deflection else np.zeros(1),
+        pulls=pulls,
         each_load=False,
         deflection=readings.deflection,
         sigma=float(np.median(base.noise.sigma)) if base.noise.known else USUAL_SIGMA,
@@ -306,9 +338,27 @@ def hung_weights(readings: Readings) -> Floats:
     measured."""
     force = readings.wrench[:, :3]
     size = np.linalg.norm(force, axis=1)
-    down = -force[:, 2] >= UPRIGHT * size
+    down = -force[:, 2] >= HANGS * size
     loads = np.unique(np.round(size[down] / STANDARD_GRAVITY, 1))
     return loads[loads > 0] if readings.deflection else loads
+
+
+def heaviest(request: DiagnoseRequest, robot: Robot) -> float:
+    """[kg] the weight that may be hung at most, infinite where nobody states one."""
+    stated = robot.rated_payload if request.payload_kg is None else request.payload_kg
+    return np.inf if stated is None else stated
+
+
+def within_payload(loads: Floats, payload: float) -> Floats:
+    """(K,) [kg] those of ``loads`` (L,) that the robot may carry."""
+    return loads[loads <= payload]
+
+
+def pulls_like(readings: Readings) -> Floats:
+    """(6, 3) [N] along and against each axis of the robot base, as large as the largest force that was measured with;
+    none where there was none."""
+    size = float(np.linalg.norm(readings.wrench[:, :3], axis=1).max(initial=0.0))
+    return size * np.concatenate([np.eye(3), -np.eye(3)]) if size > 0 else np.zeros((0, 3))
 
 
 def _box() -> Floats:

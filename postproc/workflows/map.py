@@ -22,7 +22,7 @@ from postproc.placement.workspace_map import (
 )
 from postproc.report.mapped import Mapped, map_csv, slices_shown
 from postproc.report.report import exit_code, json_bytes
-from postproc.robot.description import find_robot, load_robot
+from postproc.robot.description import check_programmable, find_robot, load_robot
 from postproc.robot.geometries import SerialArm
 from postproc.workflows.preparation import Stage, silent
 
@@ -54,6 +54,7 @@ class MapRequest:
 def map_workspace(request: MapRequest, stage: Stage = silent) -> Mapped:
     """The deflection over a part of the workspace.  Raises Refusal, and has then written nothing."""
     robot = load_robot(find_robot(request.robot))
+    check_programmable(robot)
     model = StiffnessModel.from_robot(robot)
     if request.sign is not None:
         if not has_compensator(model):

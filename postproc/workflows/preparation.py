@@ -32,7 +32,7 @@ from postproc.robot.axis_track import (
     follow_axes,
     nominal_flange,
 )
-from postproc.robot.description import Robot, find_robot, load_robot
+from postproc.robot.description import Robot, check_programmable, find_robot, load_robot
 from postproc.robot.external_axes import External
 from postproc.robot.geometries import SerialArm
 from postproc.robot.orientation_modes import as_run
@@ -204,6 +204,7 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
         robot = learned.robot
     else:
         robot = load_robot(find_robot(cell.robot, beside))
+    check_programmable(robot)
     full = StiffnessModel.from_robot(robot)
     gravity = cell.robot_base.rotation.T @ full.gravity
     model = replace(corrected_model(full, cell), gravity=gravity)

@@ -29,6 +29,12 @@ MARGIN = 10.0
 """By how much -2 ln(likelihood), on the average over what parameters may be, of anything else must be worse than the
 truth's for an oracle to tell them apart."""
 
+TWIN, TWIN_SHARE = 4.0, 0.05
+"""Squares of a signal, in variances and as a share of all, that an equal one may miss."""
+
+CURVED = 0.005
+"""Share of a change of geometry that its first order may miss: a hundredth of a radian is no small turn."""
+
 SEEN = 1e-3
 """Share of a column that must stand outside of what is explained anyway."""
 
@@ -66,6 +72,7 @@ class Oracle:
         length = np.linalg.norm(self.explained, axis=0)
         u, s, _ = np.linalg.svd(self.explained / np.where(length > 0, length, 1.0), full_matrices=False)
         self._basis = u[:, s > 1e-9 * s[0]]
+        self._free = _basis(np.column_stack([own, nuisance]))
         self.rows = len(own)
         self.freedom = self.rows - nuisance.shape[1]
 
@@ -92,11 +99,30 @@ class Oracle:
             own = self.outside(self._flat(moves))
             return likelihood_gain(own - basis @ (basis.T @ own), y - basis @ (basis.T @ y))
 
-        best, found = gain(self._of(truth, size)), []
+        mine = self._of(truth, size)
+        signal = self.outside(self._flat(mine))
+        signal = _project(_basis(signal - basis @ (basis.T @ signal)), y)
+        best, found = gain(mine), []
         for effect, joint, moves in self._library():
             if (effect, joint) != (truth.effect, truth.joint):
-                found.append(Rival(effect, joint, best - gain(moves)))
+                own = self.outside(self._flat(moves))
+                missed = signal - _project(_basis(own - basis @ (basis.T @ own)), signal)
+                # what predicts the same is no worse, however many parameters it has
+                found.append(Rival(effect, joint, 0.0 if _is_little(missed, signal) else best - gain(moves)))
         return sorted([*found, Rival("nothing", "", best)], key=lambda rival: rival.margin)
+
+    def is_own(self, truth: Hidden, size: float) -> bool:
+        """Whether parameters that the robot file states do the same as ``truth``, however far they have to go: a zero
+        of a joint is a shift and a twist of the axes after it."""
+        model = joined(self.model, truth.made)
+        values = truth.at(size)
+        unknowns = [u for u in unknowns_in(truth, model) if u.parameter.name in values]
+        share = np.array(
+            [(values[u.parameter.name] - u.parameter.null) / u.parameter.scale for u in unknowns]
+        )
+        signal = self._flat(self._of(truth, size)[:, :, : len(share)]) @ share
+        missed = signal - _project(self._free, signal)
+        return float(np.linalg.norm(missed)) < CURVED * float(np.linalg.norm(signal))
 
     def beyond(self, signal: np.ndarray) -> float:
         """SNR of what of a ``signal`` no single effect of the library can imitate either."""
@@ -145,6 +171,8 @@ class Oracle:
                 if not np.abs(moves).max() > 0:
                     model = model.with_values({u.key: u.parameter.scale for u in unknowns})
                     moves = self._columns(model, unknowns)
+                if not effect.apart or effect.whole:
+                    yield name, "", moves
                 for joint in dict.fromkeys(u.parameter.joint for u in unknowns):
                     own = [i for i, u in enumerate(unknowns) if u.parameter.joint == joint]
                     if np.linalg.norm(moves[:, :, own]) / self.sigma > SEEN:
@@ -194,6 +222,15 @@ def own_unknowns(model: StiffnessModel) -> list[Unknown]:
     """What the robot file states."""
     every = [u for term in range(len(model.terms)) for u in unknowns_of(model, term)]
     return [u for u in every if u.stated is not None and not u.fixed]
+
+
+def _project(basis: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return basis @ (basis.T @ values)
+
+
+def _is_little(missed: np.ndarray, signal: np.ndarray) -> bool:
+    squares = float(missed @ missed)
+    return squares < TWIN and squares < TWIN_SHARE * float(signal @ signal)
 
 
 def _basis(part: np.ndarray) -> np.ndarray:

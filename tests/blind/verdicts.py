@@ -18,6 +18,8 @@ from .cases import Run
 from .gap import closed
 from .oracle import MARGIN, Rival
 
+GEOMETRY = ("link_geometry", "joint_offset")
+
 WITHOUT_JOINTS = ("link_gravity",)
 """Effects of an arm as a whole, whatever joints their parameters stand beside."""
 
@@ -73,7 +75,27 @@ def outcome_of(run: Run, answer: dict, rivals: list[list[Rival]]) -> str:
     names = names.union(*(one for one in sets if len(one) == 1))
     sets = [one for one in sets if len(one) > 1]
     outside = any(h.outside for h, _ in run.hidden)
-    return outcome_of_words(answer["verdict"], truth_of(run), names, sets, outside, rivals)
+    truth = truth_of(run) - (of_own_geometry(run, answer) - names.union(*sets))
+    if truth != truth_of(run):
+        rivals = [
+            of for (h, _), of in zip(run.hidden, rivals, strict=True) if named(h.effect, h.joint) in truth
+        ]
+    return outcome_of_words(answer["verdict"], truth, names, sets, outside, rivals)
+
+
+def of_own_geometry(run: Run, answer: dict) -> set[tuple[str, str]]:
+    """What of the truth is a change of lengths and twists that the robot file states, where it is said that these have
+    changed."""
+    if run.case.row == "unidentifiable":
+        return set()
+    moved = {one["parameter"].split(".")[0] for one in answer.get("refitted", ())}
+    if not moved & set(GEOMETRY):
+        return set()
+    return {
+        named(h.effect, h.joint)
+        for h, size in run.hidden
+        if h.effect in GEOMETRY and run.oracle.is_own(h, size)
+    }
 
 
 def named(effect: str, joint: str) -> tuple[str, str]:
