@@ -55,6 +55,7 @@ class FlowGraph:
         self.blocks: list[FlowBlock] = [FlowBlock()]
         self.missing = False
         self.loops: dict[int, int] = {}
+        self._depth = 0  # loops in each other
         self._labels: dict[bytes, int] = {}
         self._jumps: list[tuple[FlowBlock, bytes]] = []
         self._body(body)
@@ -133,13 +134,15 @@ class FlowGraph:
         """last := ..; step := ..; i := first; WHILE i is not beyond last DO ...; i := i + step; ENDWHILE.  Without a
         step it counts down where the first value exceeds the last one."""
         at = statement.start
-        name, last, step = (Name(word, at, at) for word in (statement.name, *loop_names(statement)))
+        name, last, step = (Name(word, at, at) for word in (statement.name, *loop_names(self._depth)))
         sense = statement.step or OperatorExpression(SENSE, (statement.first, statement.last), at, at)
         test = OperatorExpression(GOES_ON, (name, last, step), at, at)
         more = AssignmentStatement(name, OperatorExpression(b"+", (name, step), at, at), at, at)
         start = ((last, statement.last), (step, sense), (name, statement.first))
         self.blocks[-1].steps += [AssignmentStatement(target, value, at, at) for target, value in start]
+        self._depth += 1
         self._loop(test, statement.body, [more])
+        self._depth -= 1
         end = [AssignmentStatement(target, NOTHING, at, at) for target in (name, last, step)]
         self.blocks[-1].steps += end  # they are of the loop alone
 

@@ -40,7 +40,6 @@ from postproc.languages.rapid.syntax_tree import (
     PlainMotions,
     RapidRoutine,
     Remark,
-    loop_names,
 )
 from postproc.languages.rapid.values import UnknownData, Value, number_of, plain, replaced, truth_of
 from postproc.toolpath import ArcFrame, Kind, OrientationMode
@@ -49,6 +48,7 @@ OTHER = MotionForm(Kind.OTHER)
 _SETTINGS = frozenset([b"TOOLDATA", b"WOBJDATA", b"SPEEDDATA", b"ZONEDATA"])
 MOST_STEPS = 4_000_000
 """Statements that are followed; each statement of a file counts for four more."""
+NOT_CONSTANT = " is not constant: "
 DEEPEST = 12
 """Calls in each other."""
 
@@ -380,16 +380,16 @@ class Propagation:
         if key == variable and (variable not in self.data or self.data.is_constant(variable)):
             return
         old, _ = self._look(state)(variable)
-        new = (
-            UnknownData(f"{shown} is not constant: {value.reason}")
-            if isinstance(value, UnknownData)
-            else value
-        )
+        new = value
+        if isinstance(value, UnknownData) and NOT_CONSTANT not in value.reason:
+            new = UnknownData(f"{shown}{NOT_CONSTANT}{value.reason}")
         state.values[key] = replaced(old, place, new, f"a part of {shown} is assigned that is not known")
 
     def _key(self, name: bytes) -> bytes:
         """The name of a variable in the state: that of a routine's own has its routine before it."""
         if self._active:
+            if b" " in name:  # of a loop
+                return self._active[-1].name + b"/" + name
             own = self._own(self._active[-1]).get(name)
             return name if own is None else own[0]
         return name
@@ -404,8 +404,7 @@ class Propagation:
                 if isinstance(statement, DataDeclaration):
                     names[statement.name] = (before + statement.name, statement.type)
                 elif isinstance(statement, For):
-                    for name in (statement.name, *loop_names(statement)):
-                        names[name] = (before + name, b"NUM")
+                    names[statement.name] = (before + statement.name, b"NUM")
             self._locals[routine.name] = names
         return names
 
@@ -425,7 +424,7 @@ class Propagation:
     def _type(self, name: bytes, key: bytes) -> bytes:
         if key == name:
             return self.data.types.get(name, b"")
-        return self._own(self._active[-1])[name][1]
+        return b"NUM" if b" " in name else self._own(self._active[-1])[name][1]
 
     def _evaluator(self, state: ProgramState) -> Evaluator:
         return Evaluator(self._look(state), self.module.records, self.data.evaluator.shadowed)

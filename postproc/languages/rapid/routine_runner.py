@@ -11,8 +11,9 @@ from postproc.languages.rapid.flow_graph import FlowGraph
 from postproc.languages.rapid.program_state import ProgramState
 
 UNROLLED = 10_000
-"""Blocks of loops that are run pass by pass, in a run of a routine and what it calls."""
-NESTED = 2
+"""Statements in loops up to which these are run by themselves, in a run of a routine and what it calls; further ones
+are run together, each statement a few times."""
+NESTED = 1
 """Loops in each other whose passes are not known and in which further loops are run pass by pass."""
 DEEPEST = 20
 """Loops in each other that are run by themselves; those in them are run together."""
@@ -26,7 +27,7 @@ class RoutineRunner:
     def __init__(self, after: After) -> None:
         self._after = after
         self.recording = False
-        self._left = 0  # blocks that can still be run pass by pass
+        self._left = 0  # statements and blocks that can still be run in loops
         self._deep = 0  # loops in each other
         self._unknown = 0  # loops that are run until nothing changes
 
@@ -61,6 +62,8 @@ class RoutineRunner:
             if here is None:
                 at += 1
                 continue
+            if self._deep:
+                self._left -= 1 + len(graph.blocks[at].steps)
             if after_loop is None:
                 led = self._after(graph, at, here.copy())
                 at += 1
@@ -104,7 +107,6 @@ class RoutineRunner:
             [(there, inside)] = led
             if there == after:
                 return inside
-            self._left -= after - head
             back = self._region(graph, head + 1, after, inside, ends)
             if back is None or back == state:
                 return None
@@ -114,7 +116,7 @@ class RoutineRunner:
         self, graph: FlowGraph, head: int, after: int, state: ProgramState, ends: list[ProgramState]
     ) -> ProgramState | None:
         """As ``_loop``, where it is not known how often it runs."""
-        if self._unknown >= NESTED:
+        if self._unknown >= NESTED or self._left < 0:
             return self._repeated(graph, head, after, state, ends)
         state, before = state.copy(), self.recording
         self._unknown += 1

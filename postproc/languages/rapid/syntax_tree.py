@@ -188,9 +188,10 @@ class For:
     start: int
 
 
-def loop_names(statement: For) -> tuple[bytes, bytes]:
-    """What no program can name: the last value and the step of a loop, which are computed once."""
-    return b"last of %d" % statement.start, b"step of %d" % statement.start
+def loop_names(depth: int) -> tuple[bytes, bytes]:
+    """What no program can name, for the blank in it: the last value and the step of a loop in ``depth`` others, which
+    are computed once."""
+    return b"last of %d" % depth, b"step of %d" % depth
 
 
 @dataclass(frozen=True, slots=True)
