@@ -10,10 +10,10 @@ from linear import MB, MEGABYTES, SECONDS, all_cases, import_readers, measure
 from patterns import find_patterns
 from regex_cost import find_ambiguity
 
-LARGE = "postproc.languages.krl.scan._RUN"
+LARGE = {"postproc.languages.krl.scan._RUN", "postproc.languages.rapid.plain_lines._RUN"}
 """Lines of `_LINE` one after the other, all possessive: its line is looked at instead."""
 
-PATTERNS = [each for each in find_patterns() if each[0] != LARGE]
+PATTERNS = [each for each in find_patterns() if each[0] not in LARGE]
 CASES = {f"{case.kind}: {case.name}": case for case in all_cases()}
 RUNS = (*" \t0aA\"'{}([],.-=:;#/", "a ", "1,", "[0", "S ")
 

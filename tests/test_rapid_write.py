@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import postproc
 from postproc.base.document import Document, Edit, Edits, Span, apply
 from postproc.base.findings import Refusal
-from postproc.base.geometry import Poses, rotation_from_abc, rotation_from_vector
+from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.base.units import DEG, MM
 from postproc.languages import DIALECTS
-from postproc.languages.dialect import EditedTargets, Program, ReadingSettings, WritingSettings
+from postproc.languages.dialect import EditedTargets, Program, WritingSettings
 from postproc.languages.permitted import refuse_other
 from postproc.languages.rapid.quaternions import quaternion_from_rotation
 from postproc.robot.axis_track import follow_axes, nominal_flange
@@ -257,81 +256,6 @@ def test_a_number_after_a_string_with_an_exclamation_mark_is_no_comment() -> Non
     at = raw.index(b"[[1,") + 2
     with pytest.raises(Refusal):
         refuse_other(said, Edits.joined([Edit(Span(0, at, at + 1), b"2")]), RAPID.letters)
-
-
-CELL = """\
-robot: kuka_kr270
-tools: {1: {x: 120, y: 0, z: 250, a: 0, b: 30, c: 0, axis: +z}}
-bases: {1: {x: 1450, y: -100, z: 600, a: 0, b: 0, c: 0}}
-start: [0, -90, 90, 0, 45, 0]
-symbols: {tSpindle: 1, wPart: 1}
-tolerance: 0.02
-max_growth: 6
-"""
-
-
-def two_programs(folder: Path, seed: int) -> tuple[Path, Path]:
-    """One path, with lines, arcs and turns of the tool, as KRL and as RAPID."""
-    random = np.random.default_rng(seed)
-    krl = ["DEF part()", "$BASE=BASE_DATA[1]", "$TOOL=TOOL_DATA[1]", "$VEL.CP=0.05", "$CIRC_TYPE=#PATH"]
-    krl += ["PTP {A1 0,A2 -90,A3 90,A4 0,A5 45,A6 0}"]
-    rapid = ["MODULE part", "PROC main()", "ConfL\\Off;"]
-    rapid += ["MoveAbsJ [[0,-90,90,0,45,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v1000,fine,tSpindle\\WObj:=wPart;"]
-    position, abc = np.array([0.0, 0.0, -5.0]), np.array([0.0, 0.0, 180.0])
-
-    def spelt(position, abc) -> tuple[str, str]:
-        q = quaternion_from_rotation(rotation_from_abc(abc * DEG)[None], np.array([[1.0, 0, 0, 0]]))[0]
-        numbers = [f"{value:.4f}" for value in position]
-        one = ",".join(f"{k} {v}" for k, v in zip("XYZ", numbers, strict=True))
-        one += "," + ",".join(f"{k} {v:.7f}" for k, v in zip("ABC", abc, strict=True))
-        return "{" + one + "}", f"[[{','.join(numbers)}],[{','.join(f'{v:.9f}' for v in q)}],{EXTRA}]"
-
-    for _ in range(int(random.integers(6, 14))):
-        abc = abc + random.uniform(-3, 3, 3)
-        via = spelt(position + np.array([8.0, 6.0, 0.5]), abc)
-        position = position + random.uniform([10, -10, -0.5], [20, 10, 0.5])
-        end = spelt(position, abc)
-        if random.random() < 0.25 and len(krl) > 7:
-            krl.append(f"CIRC {via[0]},{end[0]}")
-            rapid.append(f"MoveC {via[1]},{end[1]},v50,fine,tSpindle\\WObj:=wPart;")
-        else:
-            krl.append(f"LIN {end[0]}")
-            rapid.append(f"MoveL {end[1]},v50,fine,tSpindle\\WObj:=wPart;")
-    one, other = folder / "part.src", folder / "part.mod"
-    one.write_text("\n".join([*krl, "END"]) + "\n")
-    other.write_text("\n".join([*rapid, "ENDPROC", "ENDMODULE"]) + "\n")
-    (folder / "cell.yaml").write_text(CELL)
-    return one, other
-
-
-def same_as_krl(folder: Path, seed: int) -> int:
-    """Holds the corrected poses of one path written in both languages to be the same; how many there are."""
-    folder.mkdir()
-    paths, exits = [], []
-    for program, dialect in zip(two_programs(folder, seed), (KRL, RAPID), strict=True):
-        report = postproc.compensate(program, force="40,360,560@base", output=folder / "out" / program.name)
-        exits.append(report.exit)
-        out = folder / "out" / program.name
-        settings = ReadingSettings(symbols={"TSPINDLE": 1.0, "WPART": 1.0})
-        paths.append(dialect.read((Document(out, out.read_bytes()),), settings).toolpath)
-    assert exits[0] == exits[1]
-    one, other = paths
-    assert one.kind.tolist() == other.kind.tolist()
-    moving = one.kind != Kind.AXIS
-    assert one.position[moving] / MM == pytest.approx(other.position[moving] / MM, abs=0.0003)
-    turns = np.einsum("nij,nij->n", one.rotation[moving], other.rotation[moving])
-    assert np.degrees(np.arccos(np.clip((turns - 1) / 2, -1, 1))).max() < 1e-3
-    assert one.arcs.sweep == pytest.approx(other.arcs.sweep, abs=1e-3, nan_ok=True)
-    return int(moving.sum()) if exits[0] == 0 else 0
-
-
-def test_a_path_in_rapid_is_corrected_as_the_same_path_in_krl(tmp_path: Path) -> None:
-    assert same_as_krl(tmp_path / "one", 1) > 5
-
-
-@pytest.mark.slow
-def test_many_paths_in_rapid_are_corrected_as_the_same_paths_in_krl(tmp_path: Path) -> None:
-    assert sum(same_as_krl(tmp_path / str(seed), seed) for seed in range(10, 18)) > 40
 
 
 def test_cfx_names_the_branch_that_the_robot_is_in(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Milling programs of any size: a waving path over a part with a force for each motion, in KRL and in G-code.
+"""Milling programs of any size: a waving path over a part with a force for each motion, in KRL, G-code and RAPID.
 
 Written block by block, so that the process that writes a million motions stays small: what a child process is said to
 have taken at most counts from its parent's size.
@@ -93,7 +93,28 @@ def gcode(folder: Path, count: int) -> Path:
     return folder / "big.ngc"
 
 
-MAKERS: dict[str, Maker] = {"krl": krl, "gcode": gcode}
+def rapid(folder: Path, count: int) -> Path:
+    points = path(count)
+    x, y, _ = points[0].tolist()
+    head = ["MODULE big", "PROC main()", "ConfL \\Off;"]
+
+    def line(x: float, y: float, z: float) -> str:
+        target = f"[[{x:.3f},{y:.3f},{z:.3f}],[0,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+        return f"MoveL {target},v50,z1,tMill\\WObj:=wPart;\r\n"
+
+    with open(folder / "big.mod", "w", newline="") as stream:
+        stream.writelines(f"{line}\r\n" for line in head)
+        stream.write(line(x, y, 50.0).replace("MoveL", "MoveJ"))
+        for block in _blocks(points):
+            stream.writelines(line(x, y, z) for x, y, z in block.tolist())
+        stream.write("ENDPROC\r\nENDMODULE\r\n")
+    with open(folder / "cell.yaml", "a") as stream:
+        stream.write("symbols: {TMILL: 1, WPART: 1}\n")
+    forces(folder, np.arange(count) + len(head) + 2)
+    return folder / "big.mod"
+
+
+MAKERS: dict[str, Maker] = {"krl": krl, "gcode": gcode, "rapid": rapid}
 
 
 def program(folder: Path, language: str, count: int) -> Path:

@@ -107,6 +107,8 @@ class Writer:
                     "p3:=Offs(p3,1,0,0);",
                     "p3.trans:=[1,2,3];",
                     "Incr n2;",
+                    "n1:=n1+1;",
+                    "n2:=n1-1;",
                     "SetDO do1,1;",
                     "WaitTime 0.5;",
                     f"p2.trans.x:={self.number()};",
@@ -142,7 +144,7 @@ class Writer:
                 self.motion((name,))
             self.lines.append("ENDFOR")
         elif kind == 3:
-            self.lines.append(f"WHILE {self.pick('di1=1', 'di2=1 AND n1<4')} DO")
+            self.lines.append(f"WHILE {self.pick('di1=1', 'di2=1 AND n1<4', 'n1<4', 'n2<>2')} DO")
             self.block(3, calls, depth)
             self.lines.append("ENDWHILE")
         elif kind == 4:

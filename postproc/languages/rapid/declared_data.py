@@ -21,6 +21,7 @@ from postproc.languages.rapid.syntax_tree import (
     Module,
     Name,
     NotUnderstood,
+    PlainMotions,
     RapidRoutine,
 )
 from postproc.languages.rapid.values import FALSE, TRUE, GroupValue, Leaf, UnknownData, Value, number_of
@@ -166,6 +167,8 @@ class Usage:
                 self._expressions(statement.value)
             case Instruction():
                 self._instruction(statement, routine)
+            case PlainMotions():
+                self._instruction(statement.first, routine)
             case NotUnderstood():
                 if not is_motion(statement.first):
                     self._set |= statement.names

@@ -13,6 +13,8 @@ from postproc.base.units import DEG
 from postproc.languages.rapid.data_types import RECORDS, Components
 from postproc.languages.rapid.quaternions import quaternion_from_rotation, rotation_from_quaternion
 from postproc.languages.rapid.syntax_tree import (
+    GOES_ON,
+    SENSE,
     Aggregate,
     Argument,
     Component,
@@ -52,6 +54,8 @@ _FUNCTIONS: dict[bytes, Callable[[float], float]] = {
     b"ACOS": lambda x: math.acos(x) / DEG,
     b"ATAN": lambda x: math.atan(x) / DEG,
 }
+WHOLE = 2.0**23
+"""Whole numbers below it are exact in the numbers of the controller."""
 _COMPARISONS: dict[bytes, Callable[[float, float], bool]] = {
     b"<": lambda a, b: a < b,
     b">": lambda a, b: a > b,
@@ -160,6 +164,8 @@ class Evaluator:
         unknown = next((found for value in values if (found := unknown_in(value)) is not None), None)
         if unknown is not None:
             return unknown
+        if operator in (SENSE, GOES_ON):
+            return _of_loop(values)
         if operator == b"NOT":
             truth = truth_of(values[0])
             return UnknownData("it is no truth value") if truth is None else FALSE if truth else TRUE
@@ -256,6 +262,21 @@ def _combined(operator: bytes, values: list[Value]) -> Value:
         pairs = zip(vectors[0], vectors[1], strict=True)
         return GroupValue(tuple(Leaf(a + sense * b) for a, b in pairs))
     return UnknownData("it is computed")
+
+
+def _of_loop(values: list[Value]) -> Value:
+    """1 or -1 of the first and the last value of a FOR; of its variable, the last value and the step whether it goes
+    on, for whole numbers: what rounding does to others is not known."""
+    numbers = [number_of(value) for value in values]
+    known = [number for number in numbers if number is not None]
+    if len(known) < len(numbers):
+        return UnknownData("the bounds of a loop are not known")
+    if len(known) == 2:
+        return Leaf(1.0 if known[0] <= known[1] else -1.0)
+    at, last, step = known
+    if step == 0 or not all(one == int(one) and abs(one) < WHOLE for one in (at, step)):
+        return UnknownData("a loop counts in parts")
+    return TRUE if (last - at) * step >= 0 else FALSE
 
 
 def _of_numbers(operator: bytes, one: float, other: float) -> Value:

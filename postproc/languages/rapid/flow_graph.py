@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from postproc.languages.rapid.syntax_tree import (
+    GOES_ON,
+    SENSE,
     AssignmentStatement,
     DataDeclaration,
     Expression,
@@ -16,18 +18,19 @@ from postproc.languages.rapid.syntax_tree import (
     Leave,
     Name,
     NotUnderstood,
-    NumberLiteral,
     OperatorExpression,
+    PlainMotions,
     Remark,
     Statement,
     Test,
     While,
+    loop_names,
 )
 
 NOTHING = Name(b"", 0, 0)
 """A name that nothing has: its value is not known."""
 
-Step = DataDeclaration | AssignmentStatement | Instruction | Remark | NotUnderstood
+Step = DataDeclaration | AssignmentStatement | Instruction | PlainMotions | Remark | NotUnderstood
 """A statement that goes on with the next one."""
 
 
@@ -45,11 +48,14 @@ class FlowBlock:
 
 
 class FlowGraph:
-    """The blocks of a routine; the first one is where it starts.  ``missing``: a label that no statement has."""
+    """The blocks of a routine; the first one is where it starts.  ``missing``: a label that no statement has;
+    ``loops``: block with the condition of a loop -> the block after it; between them are those of its body."""
 
     def __init__(self, body: tuple[Statement, ...]) -> None:
         self.blocks: list[FlowBlock] = [FlowBlock()]
         self.missing = False
+        self.loops: dict[int, int] = {}
+        self._depth = 0  # loops in each other
         self._labels: dict[bytes, int] = {}
         self._jumps: list[tuple[FlowBlock, bytes]] = []
         self._body(body)
@@ -58,13 +64,9 @@ class FlowGraph:
             self.missing |= label not in self._labels
 
     @property
-    def has_loops(self) -> bool:
-        """Whether any block goes back."""
-        return any(
-            0 <= there <= at
-            for at, block in enumerate(self.blocks)
-            for there in (block.follow, block.otherwise if block.condition is not None else -1)
-        )
+    def is_structured(self) -> bool:
+        """Whether only loops go back, and nothing jumps into them."""
+        return not self._jumps
 
     def _new(self) -> int:
         self.blocks.append(FlowBlock())
@@ -126,29 +128,23 @@ class FlowGraph:
         self._body(body)
         self.blocks[-1].steps += last
         self.blocks[-1].follow = at
-        head.otherwise = self._new()
+        head.otherwise = self.loops[at] = self._new()
 
     def _for(self, statement: For) -> None:
-        """i := first; WHILE i <= last DO ...; i := i + step; ENDWHILE.  Without a step it counts down where the first
-        value exceeds the last one; where that is not known, nothing of the loop is."""
+        """last := ..; step := ..; i := first; WHILE i is not beyond last DO ...; i := i + step; ENDWHILE.  Without a
+        step it counts down where the first value exceeds the last one."""
         at = statement.start
-        name, first, last, step = (
-            Name(statement.name, at, at),
-            statement.first,
-            statement.last,
-            statement.step,
-        )
-        if step is None and isinstance(first, NumberLiteral) and isinstance(last, NumberLiteral):
-            step = NumberLiteral(1.0 if first.value <= last.value else -1.0, at, at)
-        self.blocks[-1].steps.append(AssignmentStatement(name, first, at, at))
-        if isinstance(step, NumberLiteral) and step.value:
-            test = OperatorExpression(b"<=" if step.value > 0 else b">=", (name, last), at, at)
-            more = AssignmentStatement(name, OperatorExpression(b"+", (name, step), at, at), at, at)
-        else:
-            test = OperatorExpression(b"=", (name, NOTHING), at, at)
-            more = AssignmentStatement(name, NOTHING, at, at)
+        name, last, step = (Name(word, at, at) for word in (statement.name, *loop_names(self._depth)))
+        sense = statement.step or OperatorExpression(SENSE, (statement.first, statement.last), at, at)
+        test = OperatorExpression(GOES_ON, (name, last, step), at, at)
+        more = AssignmentStatement(name, OperatorExpression(b"+", (name, step), at, at), at, at)
+        start = ((last, statement.last), (step, sense), (name, statement.first))
+        self.blocks[-1].steps += [AssignmentStatement(target, value, at, at) for target, value in start]
+        self._depth += 1
         self._loop(test, statement.body, [more])
-        self.blocks[-1].steps.append(AssignmentStatement(name, NOTHING, at, at))  # it is of the loop alone
+        self._depth -= 1
+        end = [AssignmentStatement(target, NOTHING, at, at) for target in (name, last, step)]
+        self.blocks[-1].steps += end  # they are of the loop alone
 
     def _test(self, statement: Test) -> None:
         ends: list[FlowBlock] = []

@@ -30,16 +30,15 @@ def insertions(task: PlanWriter) -> tuple[list[Edit], dict[int, str]]:
     for at in range(0, len(chosen), BLOCK):
         motions = chosen[at : at + BLOCK]
         rows = task.plan.source[motions]
-        wanted, vias = task.wanted(rows, motions), task.vias(motions)
+        said = task.places.numbers(rows)
+        wanted, vias = task.wanted(said, rows, motions), task.vias(motions)
         external = None if task.plan.external is None else task.plan.external[motions]
         for k, (motion, row) in enumerate(zip(motions.tolist(), rows.tolist(), strict=True)):
             text = task.text(row)
             point = text.target
             if point is None:
                 raise ValueError(f"row {row} has no target")
-            numbers = PointNumbers(
-                task.places.numbers[row].tolist(), wanted[k].tolist(), task.decimals(point, 7)
-            )
+            numbers = PointNumbers(said[k].tolist(), wanted[k].tolist(), task.decimals(point, 7))
             words = point.words
             if external is not None:
                 words = _external(task, words, external[k].tolist(), task.path.external[row].tolist())
@@ -51,7 +50,7 @@ def insertions(task: PlanWriter) -> tuple[list[Edit], dict[int, str]]:
                 why = task.unfit_arc(motion)
                 if why:
                     unfit[row] = why
-                target = _via(task, point, vias[k].tolist(), words, row) + b"," + target
+                target = _via(task, point, vias[k].tolist(), said[k, 3:].tolist(), words) + b"," + target
             line = document.line_starts[task.path.line[row] - 1]
             start = len(BOM_UTF8) if line == 0 and task.raw.startswith(BOM_UTF8) else int(line)
             edits.append(Edit(Span(0, start, start), _line(task, motion, row, text, target, start)))
@@ -71,14 +70,11 @@ def _line(task: PlanWriter, motion: int, row: int, text: MotionText, target: byt
     return indent + word + b" " + b",".join(parts) + b";" + task.program.documents[0].newline
 
 
-def _via(task: PlanWriter, point: PointText, via: list[float], words: bytes, row: int) -> bytes:
+def _via(task: PlanWriter, point: PointText, via: list[float], turn: list[float], words: bytes) -> bytes:
     """The auxiliary point of an arc, with the orientation of its source's target, which counts for nothing."""
     place = [fixed_one(value, count) for value, count in zip(via, task.decimals(point, 3), strict=True)]
-    turn = [
-        fixed_one(value, count)
-        for value, count in zip(task.places.numbers[row, 3:].tolist(), task.least[3:], strict=True)
-    ]
-    return aggregate([*place, *turn], words)
+    orientation = [fixed_one(value, count) for value, count in zip(turn, task.least[3:], strict=True)]
+    return aggregate([*place, *orientation], words)
 
 
 def _external(task: PlanWriter, words: bytes, now: list[float], end: list[float]) -> bytes:

@@ -20,10 +20,13 @@ SHOWN = 20
 
 
 @without_garbage_collection()
-def read(documents: tuple[Document, ...], settings: ReadingSettings) -> Program:
-    """The program of a file; never raises on its content."""
+def read(documents: tuple[Document, ...], settings: ReadingSettings, fast: bool = True) -> Program:
+    """The program of a file; never raises on its content.
+
+    ``fast=False`` takes the general way for the common lines too, with the same result.
+    """
     document = documents[0]
-    module = ModuleParser(document.raw).file()
+    module = ModuleParser(document.raw, fast).file()
     flow = Propagation(module)
     findings: list[Finding] = []
     try:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import chain
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from postproc.base.arrays import Floats
+from postproc.base.arrays import Bools, Floats, Ints, shared, sums
 from postproc.base.document import Document
 from postproc.languages.rapid.data_types import ABSENT
 from postproc.languages.rapid.declared_data import walk
@@ -17,9 +19,12 @@ from postproc.languages.rapid.module_frames import ModuleFrames
 from postproc.languages.rapid.motion_facts import MotionFact, Problem, item_of, not_read, reason_of
 from postproc.languages.rapid.program_state import ELSEWHERE, START, VARYING, ProgramState
 from postproc.languages.rapid.propagation import OTHER, Propagation
-from postproc.languages.rapid.syntax_tree import Instruction, RapidRoutine
+from postproc.languages.rapid.quaternions import WORST
+from postproc.languages.rapid.syntax_tree import Instruction, PlainMotions, RapidRoutine
 from postproc.languages.rapid.target_places import (
+    NUMBERS,
     MotionText,
+    MotionTexts,
     PointText,
     point_text,
     target_numbers,
@@ -30,86 +35,144 @@ from postproc.toolpath.initial_state import Symbol
 
 QUADRANTS = 50
 """Quadrants from -50 to 49 are kept as numbers."""
+FARTHEST = 1e7
+"""[mm]"""
 
 
 @dataclass(slots=True)
 class ModuleRows:
-    """N rows: numbers (N, 7) [mm, 1], axes (N, 6) [deg], external (N, 6), vias (N, 3) [mm], as the text has them.
+    """N rows of M facts: numbers (N, 7) [mm, 1], axes [deg] of some, external (N, 6), vias (N, 3) [mm], as the text has
+    them.
 
-    offsets: of the motions -> row; problems: row -> why it cannot be corrected.
+    first (M + 1,): row of the first motion of each fact; fact_of (N,).  starts (N,): offsets of the statements; lines
+    (N,): their numbers.  base, tool (N,): indices of frames, -1 where not known; quadrants, cfx (N,): -1 likewise.
+    never_from: the first row of those that never run.  problems: row -> why it cannot be corrected.  ends: offset of
+    the last motion of a fact -> its row.
     """
 
-    facts: list[MotionFact] = field(default_factory=list)
-    lines: list[int] = field(default_factory=list)
-    columns: list[int] = field(default_factory=list)
-    offsets: dict[int, int] = field(default_factory=dict)
+    facts: list[MotionFact]
+    first: Ints
+    fact_of: Ints
+    starts: Ints
+    lines: Ints
+    numbers: Floats
+    vias: Floats
+    external: Floats
+    base: Ints
+    tool: Ints
+    quadrants: Ints
+    cfx: Ints
+    texts: MotionTexts
+    never_from: int
+    ends: dict[int, int] = field(default_factory=dict)
     problems: dict[int, Problem] = field(default_factory=dict)
-    base: list[int] = field(default_factory=list)
-    tool: list[int] = field(default_factory=list)
-    texts: list[MotionText | None] = field(default_factory=list)
-    numbers: Floats = field(default_factory=lambda: np.empty((0, 7)))
-    vias: Floats = field(default_factory=lambda: np.empty((0, 3)))
     axes: dict[int, tuple[float, ...]] = field(default_factory=dict)
-    external: Floats = field(default_factory=lambda: np.empty((0, 6)))
-    quadrants: list[int] = field(default_factory=list)
-    cfx: list[int] = field(default_factory=list)
 
     def __len__(self) -> int:
-        return len(self.facts)
+        return len(self.fact_of)
+
+    def fact(self, row: int) -> MotionFact:
+        return self.facts[int(self.fact_of[row])]
+
+    def each(self) -> Iterator[tuple[int, int, MotionFact]]:
+        """The facts with their first row and the row after their last one."""
+        bounds = self.first.tolist()
+        return zip(bounds[:-1], bounds[1:], self.facts, strict=True)
+
+    def per_row(self, values: list[Any], dtype: Any) -> NDArray[Any]:
+        """(N,) of what each fact has."""
+        return np.array(values, dtype)[self.fact_of]
 
     def refuse(self, row: int, code: str, message: str) -> None:
         self.problems.setdefault(row, (code, message))
 
+    def refuse_all(self, rows: Iterable[int], problem: Problem) -> None:
+        for row in rows:
+            self.problems.setdefault(row, problem)
+
     def before(self, row: int) -> tuple[int, ...]:
         """Rows after which a row runs; -1 for the start of the program, -2 for what it does not contain."""
-        places = self.facts[row].before
-        return tuple(sorted({at if at in (START, ELSEWHERE) else self.offsets[at] for at in places}))
+        at = self.fact_of[row]
+        if self.first[at] < row < self.never_from:
+            return (row - 1,)
+        places = self.facts[at].before
+        return tuple(sorted({one if one in (START, ELSEWHERE) else self.ends[one] for one in places}))
 
 
 def module_rows(
     document: Document, flow: Propagation, symbols: Mapping[str, Symbol]
 ) -> tuple[ModuleRows, ModuleFrames]:
     """The rows of a module, with the frames that they use."""
-    rows, frames = ModuleRows(), ModuleFrames(symbols, _declared_lines(document, flow))
-    for fact in flow.facts.values():
-        _add(rows, document, fact)
-    for fact, problem in _never_run(flow):
-        rows.refuse(len(rows), *problem)
-        _add(rows, document, fact)
-    n = len(rows)
-    numbers = [
-        target_numbers(fact.target) if fact.form.kind != Kind.AXIS else [math.nan] * 7 for fact in rows.facts
-    ]
-    rows.numbers = np.array(numbers).reshape(n, 7)
-    for part in (rows.numbers[:, :3], rows.numbers[:, 3:]):
-        part[np.isnan(part).any(axis=1)] = np.nan
-    rows.vias = np.full((n, 3), np.nan)
-    for row, fact in enumerate(rows.facts):
-        if fact.via is not None:
-            rows.vias[row] = target_numbers(fact.via)[:3]
-    for row, fact in enumerate(rows.facts):
-        _place(rows, frames, row, fact)
+    frames = ModuleFrames(symbols, _declared_lines(document, flow))
+    never = list(_never_run(flow))
+    rows = _rows(document, list(flow.facts.values()), [fact for fact, _ in never])
+    bounds = rows.first.tolist()[len(flow.facts) :]
+    for (_, problem), start, stop in zip(never, bounds[:-1], bounds[1:], strict=True):
+        rows.refuse_all(range(start, stop), problem)
+    for start, stop, fact in rows.each():
+        _place(rows, frames, range(start, stop), fact)
     _external(rows)
     return rows, frames
+
+
+def _rows(document: Document, run: list[MotionFact], never: list[MotionFact]) -> ModuleRows:
+    """The rows of facts, those that run and those that never do, without frames, configurations and external axes."""
+    facts = [*run, *never]
+    first = sums(np.array([fact.count for fact in facts], np.int64))
+    n = int(first[-1])
+    starts, numbers = np.empty(n, np.int64), np.full((n, NUMBERS), np.nan)
+    arcs = any(fact.via is not None for fact in facts)
+    vias = np.full((n, 3), np.nan) if arcs else np.broadcast_to(np.nan, (n, 3))
+    ends: dict[int, int] = {}
+    for at, fact in zip(first.tolist(), facts, strict=False):
+        lines = fact.lines
+        if lines is not None:
+            rows = slice(at, at + len(lines))
+            starts[rows] = lines.places.starts
+            ends[lines.last] = rows.stop - 1
+            if fact.arguments is not None:
+                numbers[rows] = lines.values
+            continue
+        starts[at] = fact.statement.start
+        ends[fact.statement.start] = at
+        if fact.form.kind != Kind.AXIS:
+            numbers[at] = target_numbers(fact.target)
+        if fact.via is not None:
+            vias[at] = target_numbers(fact.via)[:3]
+    for part in (numbers[:, :3], numbers[:, 3:]):
+        part[np.isnan(part).any(axis=1)] = np.nan
+    fact_of = np.repeat(np.arange(len(facts), dtype=np.int32), np.diff(first))
+    texts = [_text(document, fact) for fact in facts]
+    places = [None if fact.lines is None else fact.lines.places for fact in facts]
+    return ModuleRows(
+        facts=facts,
+        first=first,
+        fact_of=fact_of,
+        starts=starts,
+        lines=np.searchsorted(document.line_starts, starts, side="right").astype(np.int32),
+        numbers=numbers,
+        vias=vias,
+        external=np.broadcast_to(np.nan, (n, 6)),
+        base=np.full(n, -1, np.int32),
+        tool=np.full(n, -1, np.int32),
+        quadrants=np.full(n, -1, np.int32),
+        cfx=np.full(n, -1, np.int32),
+        texts=MotionTexts(document.raw, texts, places, first, fact_of),
+        never_from=int(first[len(run)]),
+        ends=ends,
+    )
 
 
 def _declared_lines(document: Document, flow: Propagation) -> dict[bytes, int]:
     return {name: document.place(at)[0] for name, at in flow.data.lines.items()}
 
 
-def _add(rows: ModuleRows, document: Document, fact: MotionFact) -> None:
-    start = fact.statement.start
-    line, column = document.place(start)
-    rows.offsets[start] = len(rows)
-    rows.facts.append(fact)
-    rows.lines.append(line)
-    rows.columns.append(column)
-    rows.texts.append(_text(document.raw, fact, start - column + 1))
-
-
-def _text(raw: bytes, fact: MotionFact, line_start: int) -> MotionText | None:
+def _text(document: Document, fact: MotionFact) -> MotionText | None:
+    """That of a fact; of a run that of its first motion."""
     if fact.arguments is None:
         return None
+    raw, statement = document.raw, fact.statement
+    line_start = statement.start - document.place(statement.start)[1] + 1
     given, options = fact.arguments, fact.arguments.options
 
     def shown(*names: bytes) -> bytes:
@@ -125,8 +188,7 @@ def _text(raw: bytes, fact: MotionFact, line_start: int) -> MotionText | None:
         points[0] = point_text(given.points[-1], fact.target, raw)
         if fact.via is not None:
             points[1] = point_text(given.points[0], fact.via, raw)
-    alone = not raw[line_start : fact.statement.start].removeprefix(b"\xef\xbb\xbf").strip()
-    statement = fact.statement
+    alone = not raw[line_start : statement.start].removeprefix(b"\xef\xbb\xbf").strip()
     return MotionText(statement.start, statement.stop, speed, zone, tool, alone, *points)
 
 
@@ -137,14 +199,16 @@ def _never_run(flow: Propagation) -> Iterator[tuple[MotionFact, Problem]]:
     for routine in flow.module.routines:
         for handlers, body in ((False, routine.body), (True, routine.handlers)):
             for one in walk(body):
+                run = one if isinstance(one, PlainMotions) else None
+                statement = one if run is None else run.first
                 if (
-                    isinstance(one, Instruction)
-                    and one.start not in flow.facts
-                    and (one.name in MOTIONS or one.name in OTHER_MOTIONS)
+                    isinstance(statement, Instruction)
+                    and statement.start not in flow.facts
+                    and (statement.name in MOTIONS or statement.name in OTHER_MOTIONS)
                 ):
-                    form = MOTIONS.get(one.name, OTHER)
-                    fact = not_read(one, form, state, "it is not run")
-                    found.append((one.start, fact, _why(flow, routine, handlers)))
+                    form = MOTIONS.get(statement.name, OTHER)
+                    fact = replace(not_read(statement, form, state, "it is not run"), lines=run)
+                    found.append((statement.start, fact, _why(flow, routine, handlers)))
     for _, fact, problem in sorted(found, key=lambda item: item[0]):
         yield fact, problem
 
@@ -161,60 +225,72 @@ def _why(flow: Propagation, routine: RapidRoutine, handlers: bool) -> Problem:
     return "RAP009", "the flow that the program's constants define does not reach it"
 
 
-def _place(rows: ModuleRows, frames: ModuleFrames, row: int, fact: MotionFact) -> None:
-    """Frames, axes and configuration of a row."""
-    line = rows.lines[row]
-    tool, base = -1, -1
-    quadrants, cfx = -1, -1
-    if row not in rows.problems:
-        problem = fact.problem
-        if problem is None and (fact.force is VARYING or fact.switch is VARYING):
-            problem = (
-                "RAP006",
-                "the FORCE or COMPENSATE comment in force differs with the path of the program",
-            )
-        if problem is not None:
-            rows.refuse(row, *problem)
-    if fact.arguments is not None:
-        found_tool, found_base = frames.tool(fact.tool, line), frames.base(fact.base, line)
-        if fact.form.kind == Kind.AXIS:
-            angles = numbers_of(item_of(fact.target, 0), 6)
-            if angles is None or max(map(abs, angles)) >= ABSENT:
-                rows.refuse(row, *_lost(fact.target))
-            else:
-                rows.axes[row] = angles
-                quadrants = _packed(tuple(float(angles[axis] // 90.0) for axis in (0, 3, 5)))
-        else:
-            _check_target(rows, row, fact)
-            for found in (found_tool, found_base):
-                if not isinstance(found, int):
-                    rows.refuse(row, *found)
-            conf = numbers_of(item_of(fact.target, 2), 4)
-            if conf is not None:
-                quadrants = _packed(conf[:3])
-                cfx = int(conf[3]) if conf[3] in range(8) and fact.checked else -1
-        tool = found_tool if isinstance(found_tool, int) else -1
-        base = found_base if isinstance(found_base, int) else -1
-    elif fact.form.kind != Kind.OTHER or fact.problem is None:
-        rows.refuse(row, "RAP001", "it is not understood")
-    rows.tool.append(tool)
-    rows.base.append(base)
-    rows.quadrants.append(quadrants)
-    rows.cfx.append(cfx)
+def _place(rows: ModuleRows, frames: ModuleFrames, these: range, fact: MotionFact) -> None:
+    """Frames, axes and configuration of the rows of a fact."""
+    first = these.start
+    line = int(rows.lines[first])
+    problem = fact.problem
+    if problem is None and (fact.force is VARYING or fact.switch is VARYING):
+        problem = "RAP006", "the FORCE or COMPENSATE comment in force differs with the path of the program"
+    if problem is not None:
+        rows.refuse_all(these, problem)
+    if fact.arguments is None:
+        if fact.form.kind != Kind.OTHER or fact.problem is None:
+            rows.refuse_all(these, ("RAP001", "it is not understood"))
+        return
+    found_tool, found_base = frames.tool(fact.tool, line), frames.base(fact.base, line)
+    if fact.form.kind == Kind.AXIS:
+        _place_axes(rows, first, fact)
+    else:
+        _check_targets(rows, these, fact)
+        for found in (found_tool, found_base):
+            if not isinstance(found, int):
+                rows.refuse_all(these, found)
+        _place_configurations(rows, these, fact)
+    if isinstance(found_tool, int):
+        rows.tool[these.start : these.stop] = found_tool
+    if isinstance(found_base, int):
+        rows.base[these.start : these.stop] = found_base
 
 
-def _check_target(rows: ModuleRows, row: int, fact: MotionFact) -> None:
-    numbers = rows.numbers[row]
-    if np.isnan(numbers).any():
+def _place_axes(rows: ModuleRows, row: int, fact: MotionFact) -> None:
+    angles = numbers_of(item_of(fact.target, 0), 6)
+    if angles is None or max(map(abs, angles)) >= ABSENT:
         rows.refuse(row, *_lost(fact.target))
-    elif abs(math.dist((0, 0, 0, 0), numbers[3:]) - 1.0) > 0.01:
-        rows.refuse(row, "RAP004", "the quaternion of its target is not of length 1")
-    elif np.abs(numbers[:3]).max() >= 1e7:
-        rows.refuse(row, "RAP002", "its target is farther away than 10 km")
-    if fact.via is not None and np.isnan(rows.vias[row]).any():
-        rows.refuse(
-            row, "RAP012", f"its auxiliary point is not known: {reason_of(fact.via, 'it is computed')}"
-        )
+    else:
+        rows.axes[row] = angles
+        rows.quadrants[row] = _packed(tuple(float(angles[axis] // 90.0) for axis in (0, 3, 5)))
+
+
+def _place_configurations(rows: ModuleRows, these: range, fact: MotionFact) -> None:
+    def packed(conf: tuple[float, ...] | None) -> tuple[int, int]:
+        if conf is None:
+            return -1, -1
+        return _packed(conf[:3]), int(conf[3]) if conf[3] in range(8) and fact.checked else -1
+
+    part = slice(these.start, these.stop)
+    if fact.lines is None:
+        rows.quadrants[part], rows.cfx[part] = packed(numbers_of(item_of(fact.target, 2), 4))
+    else:
+        each = np.array([packed(tuple(conf)) for conf in fact.lines.extras[:, :4].tolist()], np.int32)
+        rows.quadrants[part], rows.cfx[part] = each[fact.lines.which].T
+
+
+def _check_targets(rows: ModuleRows, these: range, fact: MotionFact) -> None:
+    numbers = rows.numbers[these.start : these.stop]
+    unknown: Bools = np.asarray(np.isnan(numbers).any(axis=1))
+    size = np.sqrt((numbers[:, 3:] ** 2).sum(axis=1))
+    wrong: Bools = unknown | ~(np.abs(size - 1.0) <= WORST)
+    for k in np.flatnonzero(wrong).tolist():
+        if unknown[k]:
+            rows.refuse(these[k], *_lost(fact.target))
+        else:
+            rows.refuse(these[k], "RAP004", "the quaternion of its target is not of length 1")
+    for k in np.flatnonzero(np.abs(numbers[:, :3]).max(axis=1) >= FARTHEST).tolist():
+        rows.refuse(these[k], "RAP002", "its target is farther away than 10 km")
+    if fact.via is not None and np.isnan(rows.vias[these.start]).any():
+        message = f"its auxiliary point is not known: {reason_of(fact.via, 'it is computed')}"
+        rows.refuse(these.start, "RAP012", message)
 
 
 def _lost(value: Value) -> Problem:
@@ -234,21 +310,26 @@ def _packed(quadrants: tuple[float, ...]) -> int:
 
 def _external(rows: ModuleRows) -> None:
     """External axes: NaN where the text has 9E9 throughout, LOST where it had another value before."""
-    n = len(rows)
-    values = np.full((n, 6), np.nan)
-    unknown = np.zeros(n, np.bool_)
-    for row, fact in enumerate(rows.facts):
-        part = item_of(fact.target, 1 if fact.form.kind == Kind.AXIS else 3)
-        numbers = numbers_of(part, 6)
-        if numbers is None:
-            unknown[row] = True
+    unknown: list[range] = []
+    known: list[tuple[slice, Floats, Ints]] = []
+    for row, stop, fact in rows.each():
+        numbers = numbers_of(item_of(fact.target, 1 if fact.form.kind == Kind.AXIS else 3), 6)
+        if fact.lines is not None and fact.arguments is not None:
+            known.append((slice(row, stop), fact.lines.extras[:, 4:], fact.lines.which))
+        elif numbers is None:
+            unknown.append(range(row, stop))
         else:
-            values[row] = numbers
-    absent = np.abs(values) >= ABSENT
-    stated = (np.isfinite(values) & ~absent).any(axis=0)
-    values[absent] = np.nan
-    values[absent & stated] = LOST
-    values[unknown[:, None] & stated] = COMPUTED
-    for row in np.flatnonzero(unknown).tolist():
-        rows.refuse(row, "RAP019", "its external axes are not known")
-    rows.external = values
+            known.append((slice(row, stop), np.array([numbers]), np.zeros(1, np.int32)))
+    rows.refuse_all(chain.from_iterable(unknown), ("RAP019", "its external axes are not known"))
+    stated = np.zeros(6, np.bool_)
+    for _, each, _ in known:
+        stated |= (np.abs(each) < ABSENT).any(axis=0)
+    if not stated.any():
+        return
+    values = np.full((len(rows), 6), np.nan)
+    for part in unknown:
+        values[part.start : part.stop, stated] = COMPUTED
+    for place, each, which in known:
+        there = np.where(np.abs(each) < ABSENT, each, np.where(stated, LOST, np.nan))
+        values[place] = there[which]
+    rows.external = shared(values)

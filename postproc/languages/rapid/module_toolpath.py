@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
-from postproc.base.arrays import FewRows, Floats, Ints
+from postproc.base.arrays import Bools, FewRows, Floats, Ints
 from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses, arc_through
@@ -30,6 +32,10 @@ from postproc.toolpath import (
 from postproc.toolpath.initial_state import Symbol
 
 OTHER_PATHS = "several paths of the program lead to it or from the motion before it"
+OTHER_QUADRANTS = "its quadrants (cf1, cf4, cf6) are not those of the motion before, and ConfL is on"
+NO_WORDS = "its configuration or external axes are not known in numbers"
+BLOCK = 1 << 15
+"""Motions that are worked on at a time."""
 SHORTEST = 0.1 * MM
 """[m] Points of an arc are not nearer to each other."""
 
@@ -40,59 +46,54 @@ def module_toolpath(
     """The motions of a module, their places in the text, and the findings."""
     rows, frames = module_rows(document, flow, symbols)
     n = len(rows)
-    before = [rows.before(row) for row in range(n)]
     remarks, remark_findings = put_remarks(document, flow, rows)
-    continues = _continues(before)
+    continues = _continues(rows)
     position = rows.numbers[:, :3] * MM
-    rotation = rotation_from_quaternion(rows.numbers[:, 3:])
-    kind = np.array([fact.form.kind for fact in rows.facts], np.int8)
-    arcs = _arcs(rows, frames, before, position, kind)
+    kind = rows.per_row([fact.form.kind for fact in rows.facts], np.int8)
+    arcs = _arcs(rows, frames, position, kind)
     unknown = sorted(rows.problems)
     refused = {row: _finding(document, rows, row, *rows.problems[row]) for row in unknown}
-    zones = np.array([fact.zone for fact in rows.facts])
+    facts = rows.facts
     toolpath = Toolpath(
         kind=kind,
         position=position,
-        rotation=rotation,
+        rotation=_rotations(rows.numbers[:, 3:]),
         axes=FewRows(
             np.array(sorted(rows.axes), np.int32),
             np.array([rows.axes[row] for row in sorted(rows.axes)]).reshape(-1, 6) * DEG,
             n,
         ),
-        feed=np.array([fact.speed for fact in rows.facts]) * MM,
-        base=np.array(rows.base, np.int32),
-        tool=np.array(rows.tool, np.int32),
-        line=np.array(rows.lines, np.int32),
+        feed=rows.per_row([fact.speed * MM for fact in facts], float),
+        base=rows.base,
+        tool=rows.tool,
+        line=rows.lines,
         frames=tuple(frames.refs),
         arcs=arcs,
         constraints=EditConstraints(
             refused=refused,
-            locked=_locked(document, rows, before, flow, refused),
+            locked=_locked(document, rows, flow, refused),
             no_insert_before=_whole(rows, continues, refused),
         ),
         orientation_control=OrientationControl(
-            mode=np.array([fact.orientation for fact in rows.facts], np.int8)
+            mode=rows.per_row([fact.orientation for fact in facts], np.int8)
         ),
-        configuration=Configuration(
-            {"quadrants": np.array(rows.quadrants, np.int32), "cfx": np.array(rows.cfx, np.int32)}
-        ),
+        configuration=Configuration({"quadrants": rows.quadrants, "cfx": rows.cfx}),
         external=rows.external,
-        approximation=zones * MM,
-        stops=np.array([fact.stops for fact in rows.facts], np.bool_),
+        approximation=rows.per_row([fact.zone * MM for fact in facts], float),
+        stops=rows.per_row([fact.stops for fact in facts], np.bool_),
         continues=continues,
         predecessors={
-            row: before[row]
-            for row in range(n)
-            if not continues[row] and rows.facts[row].arguments is not None
+            row: rows.before(row)
+            for row in np.flatnonzero(~continues).tolist()
+            if rows.fact(row).arguments is not None
         },
         annotations=remarks.annotations,
         comments=remarks.comments,
     )
     toolpath = _only_used(toolpath)
-    texts = tuple(rows.texts)
-    places = RapidSourceMap(
-        rows.numbers, rows.vias, texts, frozenset(flow.usage.read), RapidSourceMap.count_uses(texts)
-    )
+    single = np.flatnonzero(~rows.texts.is_plain(np.arange(n)))
+    numbers = FewRows(single, rows.numbers[single], n)
+    places = RapidSourceMap(document.raw, numbers, rows.vias, rows.texts, frozenset(flow.usage.read))
     findings = [*remark_findings, *_grouped(rows, refused), *_moving_external(document, rows)]
     return toolpath, places, findings
 
@@ -108,19 +109,27 @@ def _only_used(path: Toolpath) -> Toolpath:
     )
 
 
-def _continues(before: list[tuple[int, ...]]) -> np.ndarray:
+def _rotations(quaternions: Floats) -> Floats:
+    """(N, 3, 3) of quaternions (N, 4)."""
+    found = np.empty((len(quaternions), 3, 3))
+    for at in range(0, len(quaternions), BLOCK):
+        found[at : at + BLOCK] = rotation_from_quaternion(quaternions[at : at + BLOCK])
+    found.setflags(write=False)
+    return found
+
+
+def _continues(rows: ModuleRows) -> Bools:
     """(N,) each motion surely starts where the row before it ends, and no other motion starts there."""
-    followers: dict[int, int] = {}
-    for places in before:
-        for one in places:
-            followers[one] = followers.get(one, 0) + 1
-    found = [places == (row - 1,) and followers[row - 1] == 1 for row, places in enumerate(before)]
-    return np.array(found, np.bool_)
+    found = np.arange(len(rows)) < rows.never_from
+    first = [row for row in rows.first[:-1].tolist() if row < rows.never_from]
+    before = [rows.before(row) for row in first]
+    followers = Counter(chain.from_iterable(before))
+    for row, places in zip(first, before, strict=True):
+        found[row] = places == (row - 1,) and followers[row - 1] == 1
+    return found
 
 
-def _arcs(
-    rows: ModuleRows, frames: ModuleFrames, before: list[tuple[int, ...]], position: Floats, kind: Ints
-) -> Arcs:
+def _arcs(rows: ModuleRows, frames: ModuleFrames, position: Floats, kind: Ints) -> Arcs:
     """The circles of MoveC: from where the motion before ends through the auxiliary point to the target."""
     n = len(rows)
     at = np.flatnonzero(kind == Kind.CIRC)
@@ -128,7 +137,7 @@ def _arcs(
         return Arcs().for_motions(n)
     starts = np.full((len(at), 3), np.nan)
     for k, row in enumerate(at.tolist()):
-        starts[k] = _arc_start(rows, frames, before[row], row, position)
+        starts[k] = _arc_start(rows, frames, rows.before(row), row, position)
     vias = rows.vias[at] * MM
     centre, normal, sweep = arc_through(starts, vias, position[at])
     near = np.min(
@@ -146,7 +155,7 @@ def _arcs(
     columns = [np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full(n, np.nan)]
     for column, values in zip(columns, (centre, normal, sweep), strict=True):
         column[at] = values
-    frame = np.array([fact.arc for fact in rows.facts], np.int8)
+    frame = rows.per_row([fact.arc for fact in rows.facts], np.int8)
     return Arcs(centre=columns[0], normal=columns[1], sweep=columns[2], frame=frame)
 
 
@@ -155,7 +164,7 @@ def _arc_start(
 ) -> Floats:
     """(3,) [m] where an arc starts, in its base; refuses one of which that is not known."""
     nothing = np.full(3, np.nan)
-    if len(before) != 1 or before[0] < 0 or rows.facts[before[0]].form.kind == Kind.AXIS:
+    if len(before) != 1 or before[0] < 0 or rows.fact(before[0]).form.kind == Kind.AXIS:
         rows.refuse(row, "RAP012", "the position at its start is not known in numbers")
         return nothing
     start = before[0]
@@ -178,55 +187,62 @@ def _pose(frame: FrameRef) -> Poses | None:
     return Poses.identity() if frame.number == 0 else frame.pose
 
 
-def _whole(rows: ModuleRows, continues: np.ndarray, refused: Mapping[int, Finding]) -> dict[int, str]:
+def _whole(rows: ModuleRows, continues: Bools, refused: Mapping[int, Finding]) -> dict[int, str]:
     """Rows before which nothing can be inserted."""
+    same = rows.quadrants >= 0
+    same[1:] &= rows.quadrants[1:] == rows.quadrants[:-1]
+    same[:1] = False
     whole: dict[int, str] = {}
-    for row, fact in enumerate(rows.facts):
-        text = rows.texts[row]
-        if row in refused or text is None:
+    for start, stop, fact in rows.each():
+        text = rows.texts[start]
+        if text is None or fact.arguments is None:
             continue
-        if not continues[row]:
-            whole[row] = OTHER_PATHS
-        elif not text.alone:
-            whole[row] = "it is not the first statement in its line"
+        why = ""
+        if not text.alone:
+            why = "it is not the first statement in its line"
         elif fact.form.starts_process:
-            whole[row] = "it starts or carries a process whose distances count from its own start"
-        elif fact.arguments is not None and b"T" in fact.arguments.options:
-            whole[row] = "its time is stated (\\T)"
-        elif fact.checked is not False and not (row and rows.quadrants[row] == rows.quadrants[row - 1] >= 0):
-            whole[row] = "its quadrants (cf1, cf4, cf6) are not those of the motion before, and ConfL is on"
-        elif text.target is None or not text.target.words:
-            whole[row] = "its configuration or external axes are not known in numbers"
-    return whole
+            why = "it starts or carries a process whose distances count from its own start"
+        elif b"T" in fact.arguments.options:
+            why = "its time is stated (\\T)"
+        wordless = "" if text.target is not None and text.target.words else NO_WORDS
+        for row in range(start, stop) if why or wordless else [start]:
+            whole[row] = why or wordless
+        if not why and fact.checked is not False:
+            for row in (start + np.flatnonzero(~same[start:stop])).tolist():
+                whole[row] = OTHER_QUADRANTS
+        if not continues[start]:
+            whole[start] = OTHER_PATHS
+    return {row: why for row, why in whole.items() if why and row not in refused}
 
 
 def _locked(
     document: Document,
     rows: ModuleRows,
-    before: list[tuple[int, ...]],
     flow: Propagation,
     refused: Mapping[int, Finding],
 ) -> dict[int, Finding]:
     """Rows from whose end a refused arc starts, or where the program reads the position."""
     locked: dict[int, Finding] = {}
     for row in refused:
-        if rows.facts[row].form.kind != Kind.CIRC:
+        if rows.fact(row).form.kind != Kind.CIRC:
             continue
-        for one in before[row]:
+        for one in rows.before(row):
             if one >= 0:
                 message = f"the arc in line {rows.lines[row]} starts at this end point and is not corrected"
                 locked.setdefault(one, _finding(document, rows, one, "RAP012", message))
     for at, places in sorted(flow.reads.items()):
         for place in sorted(places):
             if place >= 0:
-                one = rows.offsets[place]
+                one = rows.ends[place]
                 message = f"line {document.place(at)[0]} reads the end position of this motion"
                 locked.setdefault(one, _finding(document, rows, one, "RAP002", message))
     return dict(sorted(locked.items()))
 
 
 def _finding(document: Document, rows: ModuleRows, row: int, code: str, message: str) -> Finding:
-    return Finding(code, message, str(document.path), rows.lines[row], rows.columns[row])
+    line = int(rows.lines[row])
+    column = int(rows.starts[row]) - int(document.line_starts[line - 1]) + 1
+    return Finding(code, message, str(document.path), line, column)
 
 
 def _grouped(rows: ModuleRows, refused: Mapping[int, Finding]) -> list[Finding]:
@@ -238,8 +254,8 @@ def _grouped(rows: ModuleRows, refused: Mapping[int, Finding]) -> list[Finding]:
     for chosen in groups.values():
         first = refused[chosen[0]]
         if len(chosen) > 1:
-            lines = [rows.lines[row] for row in chosen]
-            message = f"{first.message}; {len(chosen)} motions, lines {min(lines)} to {max(lines)}"
+            lines = rows.lines[chosen]
+            message = f"{first.message}; {len(chosen)} motions, lines {lines.min()} to {lines.max()}"
             first = replace(first, message=message)
         found.append(first)
     return found

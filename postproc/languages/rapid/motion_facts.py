@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from postproc.languages.rapid.evaluation import Evaluator
 from postproc.languages.rapid.instructions import MotionArguments, MotionForm, sort_arguments, switch_value
 from postproc.languages.rapid.program_state import VARYING, ProgramState, Varying
-from postproc.languages.rapid.syntax_tree import Argument, Index, Instruction, Name, Remark
+from postproc.languages.rapid.syntax_tree import Argument, Index, Instruction, Name, PlainMotions, Remark
 from postproc.languages.rapid.values import (
     Leaf,
     UnknownData,
@@ -39,7 +39,8 @@ class FrameUse:
 class MotionFact:
     """A motion: ``target``, ``via``: its points (``via`` of an arc alone); speed, zone: [mm/s], [mm], NaN where not
     known; ``stops``: it ends in a stop point.  ``before``: motions after which it runs; ``checked``: the configuration
-    of its target counts, None where that is not known."""
+    of its target counts, None where that is not known.  ``lines``: the run of which it is the first motion, and for
+    which it stands but for the numbers of the targets."""
 
     statement: Instruction
     form: MotionForm
@@ -58,6 +59,12 @@ class MotionFact:
     switch: Remark | Varying | None
     problem: Problem | None
     checked: bool | None
+    lines: PlainMotions | None = None
+
+    @property
+    def count(self) -> int:
+        """How many motions it stands for."""
+        return 1 if self.lines is None else len(self.lines)
 
     def joined(self, other: MotionFact) -> MotionFact:
         """What holds in both executions."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from codecs import BOM_UTF8
 
 from postproc.languages.rapid.expression_syntax import RapidExpressionParser, SyntaxProblem
+from postproc.languages.rapid.plain_lines import PlainReader
 from postproc.languages.rapid.syntax_tree import (
     AssignmentStatement,
     Component,
@@ -47,12 +48,14 @@ DEEPEST = 60
 class ModuleParser(RapidExpressionParser):
     """Reads one file."""
 
-    def __init__(self, raw: bytes) -> None:
+    def __init__(self, raw: bytes, fast: bool = True) -> None:
+        """``fast``: runs of common lines as one statement."""
         super().__init__(Tokens(raw, len(BOM_UTF8) if raw.startswith(BOM_UTF8) else 0))
         self.raw = raw
         self.module = Module()
         self._remarks = 0  # comments that are in the tree
         self._broken = -1
+        self._plain = PlainReader(raw) if fast else None
 
     def file(self) -> Module:
         """All modules of the file as one."""
@@ -195,7 +198,7 @@ class ModuleParser(RapidExpressionParser):
                 return found
             at = len(found)
             try:
-                found.append(self._statement(word, depth))
+                found.append(self._common(self._statement(word, depth)))
             except SyntaxProblem:
                 found.append(self._skip(start))
             # A comment in the line of a statement is of that statement.
@@ -205,6 +208,16 @@ class ModuleParser(RapidExpressionParser):
                 else:
                     found.insert(at, remark)
                     at += 1
+
+    def _common(self, statement: Statement) -> Statement:
+        """A statement, or the run of common lines that it starts, which is passed."""
+        if self._plain is None or not isinstance(statement, Instruction):
+            return statement
+        run = self._plain.run(statement)
+        if run is None:
+            return statement
+        self.tokens.jump(run.end)
+        return run
 
     def _statement(self, word: bytes, depth: int) -> Statement:
         start = self.next.start

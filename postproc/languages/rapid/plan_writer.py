@@ -11,8 +11,9 @@ from postproc.base.decimals import fixed_one
 from postproc.base.geometry import rotation_from_vector
 from postproc.base.units import DEG, MM
 from postproc.languages.dialect import Plan, Program, WritingSettings
+from postproc.languages.rapid.plain_lines import decimals_of
 from postproc.languages.rapid.quaternions import quaternion_from_rotation
-from postproc.languages.rapid.target_places import MotionText, PointText, RapidSourceMap, decimals_of
+from postproc.languages.rapid.target_places import MotionText, PointText, RapidSourceMap
 from postproc.toolpath import Toolpath
 
 FINER = 2
@@ -82,9 +83,10 @@ class PlanWriter:
             for i, spot in enumerate(point.spots[: len(numbers.wanted)])
         ]
 
-    def wanted(self, rows: Ints, motions: Ints) -> Floats:
-        """(K, 7) [mm, 1] targets of motions (K,) of the plan that stem from rows (K,), in the spelling of the text."""
-        numbers = self.places.numbers[rows].copy()
+    def wanted(self, own: Floats, rows: Ints, motions: Ints) -> Floats:
+        """(K, 7) [mm, 1] targets of motions (K,) of the plan that stem from rows (K,), in the spelling of the text,
+        which has the numbers ``own`` (K, 7) there."""
+        numbers = own.copy()
         position, rotation = self.plan.position[motions], self.plan.rotation[motions]
         shifted = differs(position, self.path.position[rows]).any(axis=1)
         turned = differs(rotation, self.path.rotation[rows]).any(axis=(1, 2))

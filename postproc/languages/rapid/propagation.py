@@ -7,6 +7,7 @@ them.  A motion has one fact, which holds in all of its executions.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from postproc.languages.rapid.declared_data import DeclaredData, Usage, first_value, names_in, walk
 from postproc.languages.rapid.evaluation import Evaluator, Typed
@@ -25,6 +26,7 @@ from postproc.languages.rapid.instructions import (
 )
 from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read
 from postproc.languages.rapid.program_state import ELSEWHERE, START, ProgramState
+from postproc.languages.rapid.routine_runner import RoutineRunner
 from postproc.languages.rapid.syntax_tree import (
     Argument,
     AssignmentStatement,
@@ -35,6 +37,7 @@ from postproc.languages.rapid.syntax_tree import (
     Instruction,
     Module,
     NotUnderstood,
+    PlainMotions,
     RapidRoutine,
     Remark,
 )
@@ -45,8 +48,14 @@ OTHER = MotionForm(Kind.OTHER)
 _SETTINGS = frozenset([b"TOOLDATA", b"WOBJDATA", b"SPEEDDATA", b"ZONEDATA"])
 MOST_STEPS = 4_000_000
 """Statements that are followed; each statement of a file counts for four more."""
+NOT_CONSTANT = " is not constant: "
 DEEPEST = 12
 """Calls in each other."""
+
+
+def _length(statement: object) -> int:
+    """The statements that a statement counts for."""
+    return len(statement) if isinstance(statement, PlainMotions) else 1
 
 
 class TooLong(Exception):
@@ -55,7 +64,7 @@ class TooLong(Exception):
 
 class Propagation:
     """Runs a module.  ``facts``: offset of a motion -> its fact, in the order in which they run first; ``passed``:
-    comments in that order with the number of facts before each; ``calls``: name of what is not in the file -> offset
+    comments in that order with the number of motions before each; ``calls``: name of what is not in the file -> offset
     of its first call; ``reads``: where the place of the robot is read -> the motions after which; ``unread``:
     statements that are not understood."""
 
@@ -78,8 +87,9 @@ class Propagation:
         self._graphs: dict[bytes, FlowGraph] = {}
         self._locals: dict[bytes, dict[bytes, tuple[bytes, bytes]]] = {}
         self._active: list[RapidRoutine] = []
-        self._steps = MOST_STEPS + 4 * sum(1 for r in module.routines for _ in walk(r.body))
-        self._recording = False
+        self.rows = 0
+        self._steps = MOST_STEPS + 4 * sum(_length(one) for r in module.routines for one in walk(r.body))
+        self._runner = RoutineRunner(self._after)
 
     def run(self) -> None:
         """Follows the program from main, and every routine that nothing in the file calls.  Raises TooLong."""
@@ -116,6 +126,7 @@ class Propagation:
                 state.values[name] = value
         if is_main and state.values:  # main starts again with what its last run left
             for _ in range(8):
+                self._runner.start()
                 after = self._routine(routine, state.copy(), False)
                 again = state.copy()
                 if after is not None:
@@ -126,60 +137,16 @@ class Propagation:
                 state.values = again.values
             else:
                 state.values = {name: UnknownData("it differs between runs") for name in state.values}
+        self._runner.start()
         self._routine(routine, state, True)
 
     def _routine(self, routine: RapidRoutine, state: ProgramState, recording: bool) -> ProgramState | None:
         """The state after a routine; None where it does not come back."""
-        graph = self._graph(routine)
         self._active.append(routine)
-        before, self._recording = self._recording, False
         try:
-            if graph.has_loops:
-                starts = self._fixpoint(graph, state)
-                self._recording = recording
-                return self._once(graph, starts)
-            self._recording = recording
-            return self._once(graph, {0: state})
+            return self._runner.run(self._graph(routine), state, recording)
         finally:
             self._active.pop()
-            self._recording = before
-
-    def _fixpoint(self, graph: FlowGraph, state: ProgramState) -> dict[int, ProgramState]:
-        """The states at the starts of the blocks that are reached."""
-        starts, pending = {0: state}, [0]
-        while pending:
-            at = min(pending)
-            pending.remove(at)
-            for there, after in self._after(graph, at, starts[at].copy()):
-                if there < 0:
-                    continue
-                if there not in starts:
-                    starts[there] = after.copy()
-                elif not starts[there].join(after):
-                    continue
-                if there not in pending:
-                    pending.append(there)
-        return starts
-
-    def _once(self, graph: FlowGraph, starts: dict[int, ProgramState]) -> ProgramState | None:
-        """Runs each block that is reached once; those that are not in ``starts`` when a block before leads there."""
-        end: ProgramState | None = None
-        given = len(starts) > 1 or graph.has_loops
-        for at in range(len(graph.blocks)):
-            if at not in starts:
-                continue
-            for there, after in self._after(graph, at, starts[at].copy()):
-                if there == -1:
-                    if end is None:
-                        end = after.copy()
-                    else:
-                        end.join(after)
-                elif there >= 0 and not given:
-                    if there in starts:
-                        starts[there].join(after)
-                    else:
-                        starts[there] = after.copy()
-        return end
 
     def _after(self, graph: FlowGraph, at: int, state: ProgramState) -> list[tuple[int, ProgramState]]:
         """Where a block leads, and what holds there."""
@@ -195,12 +162,14 @@ class Propagation:
         return [(block.follow if holds else block.otherwise, state)]
 
     def _step(self, step: Step, state: ProgramState) -> None:
-        self._steps -= 1
+        self._steps -= _length(step)
         if self._steps < 0:
             raise TooLong
         match step:
             case Instruction():
                 self._instruction(step, state)
+            case PlainMotions():
+                self._plain(step, state)
             case AssignmentStatement():
                 self._functions(step.value, state)
                 self._assign(step.target, self._evaluator(state).value(step.value), state)
@@ -231,8 +200,8 @@ class Propagation:
             state.displaced |= {b"a statement that is not understood"}
 
     def _remark(self, step: Remark, state: ProgramState) -> None:
-        if self._recording:
-            self.passed.setdefault(step.start, (step, len(self.facts)))
+        if self._runner.recording:
+            self.passed.setdefault(step.start, (step, self.rows))
         word = step.text.split(" ")[0].split("\t")[0].split(",")[0].upper()
         if word == "FORCE":
             state.force = step
@@ -298,13 +267,25 @@ class Propagation:
         return numbers[0] / 100.0
 
     def _move(self, step: Instruction, fact: MotionFact, state: ProgramState) -> None:
-        if self._recording:
-            known = self.facts.get(step.start)
-            self.facts[step.start] = fact if known is None else known.joined(fact)
+        self._record(step.start, fact)
         state.last = frozenset([step.start])
 
+    def _plain(self, step: PlainMotions, state: ProgramState) -> None:
+        """Motions that are run one after the other."""
+        fact = motion_fact(step.first, MOTIONS[step.first.name], state, self._evaluator(state))
+        self._record(step.start, replace(fact, lines=step))
+        state.last = frozenset([step.last])
+
+    def _record(self, at: int, fact: MotionFact) -> None:
+        """Takes up the fact of the motion at an offset."""
+        if not self._runner.recording:
+            return
+        known = self.facts.get(at)
+        self.facts[at] = fact if known is None else known.joined(fact)
+        self.rows += fact.count if known is None else 0
+
     def _unread_call(self, step: Instruction, state: ProgramState, moves: bool) -> None:
-        if self._recording:
+        if self._runner.recording:
             self.calls.setdefault(step.name, step.start)
         self._change(step.arguments, state)
         if moves:
@@ -343,7 +324,7 @@ class Propagation:
             )
             if parameter.mode and argument is not None:
                 shared.append((parameter.name, argument))
-        after = self._routine(routine, inner, self._recording)
+        after = self._routine(routine, inner, self._runner.recording)
         if after is None:
             state.last = frozenset([ELSEWHERE])
             return
@@ -368,7 +349,7 @@ class Propagation:
 
     def _note_reading(self, at: int, state: ProgramState) -> None:
         """The program reads where the robot is."""
-        if self._recording:
+        if self._runner.recording:
             self.reads[at] = self.reads.get(at, frozenset()) | state.last
 
     def _forget_all(self, names: set[bytes], state: ProgramState) -> None:
@@ -399,16 +380,16 @@ class Propagation:
         if key == variable and (variable not in self.data or self.data.is_constant(variable)):
             return
         old, _ = self._look(state)(variable)
-        new = (
-            UnknownData(f"{shown} is not constant: {value.reason}")
-            if isinstance(value, UnknownData)
-            else value
-        )
+        new = value
+        if isinstance(value, UnknownData) and NOT_CONSTANT not in value.reason:
+            new = UnknownData(f"{shown}{NOT_CONSTANT}{value.reason}")
         state.values[key] = replaced(old, place, new, f"a part of {shown} is assigned that is not known")
 
     def _key(self, name: bytes) -> bytes:
         """The name of a variable in the state: that of a routine's own has its routine before it."""
         if self._active:
+            if b" " in name:  # of a loop
+                return self._active[-1].name + b"/" + name
             own = self._own(self._active[-1]).get(name)
             return name if own is None else own[0]
         return name
@@ -420,9 +401,10 @@ class Propagation:
             before = routine.name + b"/"
             names = {one.name: (before + one.name, one.type) for one in routine.parameters}
             for statement in walk(routine.body):
-                if isinstance(statement, DataDeclaration | For):
-                    kind = statement.type if isinstance(statement, DataDeclaration) else b"NUM"
-                    names[statement.name] = (before + statement.name, kind)
+                if isinstance(statement, DataDeclaration):
+                    names[statement.name] = (before + statement.name, statement.type)
+                elif isinstance(statement, For):
+                    names[statement.name] = (before + statement.name, b"NUM")
             self._locals[routine.name] = names
         return names
 
@@ -442,7 +424,7 @@ class Propagation:
     def _type(self, name: bytes, key: bytes) -> bytes:
         if key == name:
             return self.data.types.get(name, b"")
-        return self._own(self._active[-1])[name][1]
+        return b"NUM" if b" " in name else self._own(self._active[-1])[name][1]
 
     def _evaluator(self, state: ProgramState) -> Evaluator:
         return Evaluator(self._look(state), self.module.records, self.data.evaluator.shadowed)

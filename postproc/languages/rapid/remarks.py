@@ -38,20 +38,22 @@ def put_remarks(
     shown: dict[str, Remark | None] = {"FORCE": None, "COMPENSATE": None}
     passed = iter(flow.passed.values())
     coming = next(passed, None)
-    for row, fact in enumerate(rows.facts):
+    for row, stop, fact in rows.each():
         while coming is not None and coming[1] <= row:
             word = _SPEAKS.match(coming[0].text)
             if word is not None:
                 shown[word[0].upper()] = coming[0]
             coming = next(passed, None)
         for word_, remark_or_none in (("FORCE", fact.force), ("COMPENSATE", fact.switch)):
-            if row in rows.problems or remark_or_none is shown[word_]:
+            if remark_or_none is shown[word_]:
                 continue
-            if isinstance(remark_or_none, Remark):
-                notes.append((row, len(flow.passed) + row, _annotation(document, row, remark_or_none)))
+            open_rows = (one for one in range(row, stop) if one not in rows.problems)
+            if not isinstance(remark_or_none, Remark):
+                message = f"no {word_} comment is in force, after motions with one"
+                rows.refuse_all(list(open_rows), ("RAP006", message))
+            elif (first := next(open_rows, None)) is not None:
+                notes.append((first, len(flow.passed) + first, _annotation(document, first, remark_or_none)))
                 shown[word_] = remark_or_none
-            else:
-                rows.refuse(row, "RAP006", f"no {word_} comment is in force, after motions with one")
     notes.sort(key=lambda note: note[:2])
     annotations = tuple(note for _, _, note in notes)
     comments, findings = _others(document, flow, rows)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+from numpy.typing import NDArray
 
 
 class NumberLiteral(NamedTuple):
@@ -93,6 +95,11 @@ Expression = (
 )
 
 
+SENSE, GOES_ON = b"sense of a FOR", b"a FOR goes on"
+"""Operators of what FOR does by itself: 1 or -1 of the first and the last value; whether a value is not beyond the last
+one."""
+
+
 @dataclass(frozen=True, slots=True)
 class DataDeclaration:
     """``kind``: CONST, PERS or VAR; ``extent``: of an array, () for others."""
@@ -124,6 +131,46 @@ class Instruction:
     stop: int
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class PlainPlaces:
+    """Where K motions that are alike are: starts (K,): offsets of the statements; from there are counted targets (K,):
+    the ends of their targets, stops (K,): their ends, literals, literal_stops (K, 7): those of x, y, z, q1..q4."""
+
+    starts: NDArray[Any]
+    targets: NDArray[Any]
+    stops: NDArray[Any]
+    literals: NDArray[Any]
+    literal_stops: NDArray[Any]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlainMotions:
+    """K motions that follow each other, one a line, and differ in the numbers of their targets alone.
+
+    first: the statement of the first one.  values (K, 7): x, y, z [mm], q1..q4.  extras (U, 10): configurations and
+    external axes; which (K,): the row of ``extras`` of each.  end: of the last line.
+    """
+
+    first: Instruction
+    places: PlainPlaces
+    values: NDArray[Any]
+    extras: NDArray[Any]
+    which: NDArray[Any]
+    end: int
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @property
+    def start(self) -> int:
+        return self.first.start
+
+    @property
+    def last(self) -> int:
+        """Offset of the last motion."""
+        return int(self.places.starts[-1])
+
+
 @dataclass(frozen=True, slots=True)
 class If:
     branches: tuple[tuple[Expression, tuple[Statement, ...]], ...]
@@ -139,6 +186,12 @@ class For:
     step: Expression | None
     body: tuple[Statement, ...]
     start: int
+
+
+def loop_names(depth: int) -> tuple[bytes, bytes]:
+    """What no program can name, for the blank in it: the last value and the step of a loop in ``depth`` others, which
+    are computed once."""
+    return b"last of %d" % depth, b"step of %d" % depth
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,6 +253,7 @@ Statement = (
     DataDeclaration
     | AssignmentStatement
     | Instruction
+    | PlainMotions
     | If
     | For
     | While

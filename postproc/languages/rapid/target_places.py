@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.base.arrays import Bools, FewRows, Floats, Ints
+from postproc.base.decimals import literals
 from postproc.languages.rapid.motion_facts import is_direct, item_of
-from postproc.languages.rapid.syntax_tree import Aggregate, Argument, Index, Name
+from postproc.languages.rapid.plain_lines import other_literal
+from postproc.languages.rapid.syntax_tree import Aggregate, Argument, Index, Name, PlainPlaces
 from postproc.languages.rapid.values import Leaf, Value, numbers_of
 
 NUMBERS = 7
 """Of a target that can be corrected: x, y, z and q1 to q4."""
 NOWHERE = ((-1, -1),) * NUMBERS
+_LIST = re.compile(rb"\[[^\[\]]*+\]")
 _EDITABLE = re.compile(rb"[-+]?[ \t]*[0-9.]")
 
 
@@ -48,29 +53,101 @@ class MotionText:
     via: PointText | None
 
 
-@dataclass(frozen=True, eq=False)
-class RapidSourceMap:
-    """What the text says of N motions.  numbers (N, 7): x, y, z [mm], q1..q4 of the targets as written, NaN where not
-    known; vias (N, 3) [mm]: of arcs; ``motions``: their texts, None where a motion is not understood; ``read``: names
-    that other code reads too.
+class MotionTexts:
+    """The texts of N motions; those of runs of common lines are made where they are asked for.
+
+    texts, runs: of each fact; first (M + 1,), fact_of (N,): as in ``ModuleRows``.
     """
 
-    numbers: NDArray[np.float64]
-    vias: NDArray[np.float64]
-    motions: tuple[MotionText | None, ...]
-    read: frozenset[bytes]
-    uses: dict[int, int] = field(default_factory=dict)
-
-    @staticmethod
-    def count_uses(motions: tuple[MotionText | None, ...]) -> dict[int, int]:
-        """Offset of a literal -> how many points use it."""
-        uses: dict[int, int] = {}
-        for motion in motions:
-            for point in () if motion is None else (motion.target, motion.via):
+    def __init__(
+        self,
+        raw: bytes,
+        texts: list[MotionText | None],
+        runs: list[PlainPlaces | None],
+        first: Ints,
+        fact_of: Ints,
+    ) -> None:
+        self._raw, self._texts, self._runs, self._first, self._fact_of = raw, texts, runs, first, fact_of
+        self._uses: dict[int, int] = {}
+        for text, run in zip(texts, runs, strict=True):
+            for point in () if text is None or run is not None else (text.target, text.via):
                 for start, _ in () if point is None else point.spots:
                     if start >= 0:
-                        uses[start] = uses.get(start, 0) + 1
-        return uses
+                        self._uses[start] = self._uses.get(start, 0) + 1
+
+    def __getitem__(self, row: int) -> MotionText | None:
+        """That of a motion; None where it is not understood."""
+        at = int(self._fact_of[row])
+        text, run = self._texts[at], self._runs[at]
+        if text is None or run is None:
+            return text
+        raw, place = self._raw, row - int(self._first[at])
+        start = int(run.starts[place])
+        target, stop = start + int(run.targets[place]), start + int(run.stops[place])
+        ends = zip(run.literals[place].tolist(), run.literal_stops[place].tolist(), strict=True)
+        spots = tuple((start + one, start + other) for one, other in ends)
+        lists = _LIST.findall(raw, spots[-1][1] + 1, target)
+        words = b",".join(b" ".join(one.split()) for one in lists)
+        point = PointText(spots, (raw.index(b"[", start), target), words, b"", True)
+        return replace(text, start=start, stop=stop, target=point)
+
+    def uses(self, start: int) -> int:
+        """How many points use the literal at an offset."""
+        return self._uses.get(start, 1)
+
+    def is_plain(self, rows: Ints) -> Bools:
+        """(K,) whether motions (K,) are of runs, where every literal is in the line and of that motion alone."""
+        there = np.array(
+            [t is not None and r is not None for t, r in zip(self._texts, self._runs, strict=True)]
+        )
+        return np.asarray(there[self._fact_of[rows]], np.bool_)
+
+    def literals(self, rows: Ints) -> tuple[Ints, Ints]:
+        """Starts and stops (K, 7) of the literals of motions (K,) of runs, ascending.
+
+        Raises ValueError for a motion of no run: a defect of the caller.
+        """
+        facts = self._fact_of[rows]
+        cuts = [0, *(np.flatnonzero(np.diff(facts)) + 1).tolist(), len(rows)]
+        starts, stops = [np.empty((0, NUMBERS), np.int64)], [np.empty((0, NUMBERS), np.int64)]
+        for low, high in pairwise(cuts) if len(rows) else ():
+            run = self._runs[facts[low]]
+            if run is None:
+                raise ValueError("a motion is of no run")
+            these = rows[low:high] - self._first[facts[low]]
+            begins = run.starts[these].astype(np.int64)[:, None]
+            starts.append(begins + run.literals[these])
+            stops.append(begins + run.literal_stops[these])
+        return np.concatenate(starts), np.concatenate(stops)
+
+
+@dataclass(frozen=True, eq=False)
+class RapidSourceMap:
+    """What the text says of N motions.  single (N, 7): x, y, z [mm], q1..q4 of the targets as written, of motions that
+    are of no run, NaN where not known; vias (N, 3) [mm]: of arcs; ``motions``: their texts; ``read``: names that other
+    code reads too.
+    """
+
+    raw: bytes
+    single: FewRows
+    vias: NDArray[np.float64]
+    motions: MotionTexts
+    read: frozenset[bytes]
+
+    def literals(self, rows: Ints) -> tuple[Floats, Ints, Ints, Ints]:
+        """Values, decimals, starts and stops (K, 7) of the literals of motions (K,) of runs, ascending."""
+        start, stop = self.motions.literals(rows)
+        text = np.frombuffer(self.raw, np.uint8)
+        values, decimals = literals(text, start.ravel(), stop.ravel(), other_literal)
+        return values.reshape(start.shape), decimals.reshape(start.shape), start, stop
+
+    def numbers(self, rows: Ints) -> Floats:
+        """(K, 7) [mm, 1] of motions (K,), ascending, as written; NaN where not known."""
+        found = self.single[rows]
+        plain = self.motions.is_plain(rows)
+        if plain.any():
+            found[plain] = self.literals(rows[plain])[0]
+        return found
 
 
 def target_numbers(value: Value) -> list[float]:
@@ -138,10 +215,3 @@ def _spelt(number: float) -> bytes:
     if number == 9e9:
         return b"9E9"
     return b"%d" % number if number == int(number) and abs(number) < 1e9 else repr(number).upper().encode()
-
-
-def decimals_of(literal: bytes) -> int:
-    """The decimals that a literal is written with, its exponent considered."""
-    mantissa, _, exponent = literal.upper().partition(b"E")
-    written = len(mantissa.partition(b".")[2].strip())
-    return min(max(written - int(exponent or b"0"), 0), 12)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Ints, differs
-from postproc.base.decimals import fixed_one
+from postproc.base.decimals import fixed, fixed_one
 from postproc.base.document import Edit, Edits, Span
 from postproc.base.findings import Finding
 from postproc.languages.dialect import EditedTargets, Plan, Program, Role, WritingSettings
@@ -16,6 +17,8 @@ from postproc.languages.rapid.plan_writer import PlanWriter, PointNumbers, aggre
 from postproc.languages.rapid.target_places import MotionText, PointText
 from postproc.toolpath import Kind
 
+BLOCK = 1 << 14
+"""Motions that are written at a time."""
 HELP = "Give each motion its own point in numbers."
 _OPERAND = frozenset(b"0123456789 \t.,:+-*/'=#_$[]{}()\\ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz")
 
@@ -28,6 +31,10 @@ def edit_targets(program: Program, plan: Plan, writing: WritingSettings) -> Edit
     return _Writer(program, plan, writing).edited()
 
 
+def _blocks(rows: Ints) -> Iterator[Ints]:
+    return (rows[at : at + BLOCK] for at in range(0, len(rows), BLOCK))
+
+
 class _Writer:
     def __init__(self, program: Program, plan: Plan, writing: WritingSettings) -> None:
         self.task = PlanWriter(program, plan, writing)
@@ -37,21 +44,24 @@ class _Writer:
         task = self.task
         touched, way = self._touched()
         self._refuse_forbidden(touched, way)
-        edits = list(self._in_text(np.flatnonzero(touched | way)))
+        changed = np.flatnonzero(touched | way)
+        plain = task.places.motions.is_plain(changed)
+        edits = list(self._in_text(changed[~plain]))
+        numbers = (self._in_lines(part) for part in _blocks(changed[plain]))
         inserted, unfit = insertions(task)
         for row, why in unfit.items():
             self.hold(row, why, "RAP012")
         if self.held:
             return EditedTargets((), self.held)
-        return EditedTargets(Edits.joined(edits, inserted))
+        return EditedTargets(Edits.collected(chain([edits, inserted], numbers)))
 
     def _touched(self) -> tuple[Bools, Bools]:
         """(N,) rows whose end is another one, and arcs whose path is."""
         path, plan, own = self.task.path, self.task.plan, self.task.own
         n = len(path)
         touched, way = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
-        for at in range(0, n, 1 << 14):
-            rows = np.arange(at, min(at + (1 << 14), n))
+        for at in range(0, n, BLOCK):
+            rows = np.arange(at, min(at + BLOCK, n))
             there = own[rows]
             touched[rows] = differs(plan.position[there], path.position[rows]).any(axis=1)
             touched[rows] |= differs(plan.rotation[there], path.rotation[rows]).any(axis=(1, 2))
@@ -75,17 +85,28 @@ class _Writer:
         if wrong:
             raise ValueError(f"motions that cannot be divided are divided: rows {sorted(wrong)[:5]}")
 
+    def _in_lines(self, rows: Ints) -> Edits:
+        """Edits of the literals of ``rows`` (K,) of runs of common lines, each of one motion alone."""
+        task = self.task
+        own, written, start, stop = task.places.literals(rows)
+        decimals = np.maximum(written, task.least)
+        wanted = task.wanted(own, rows, task.own[rows])
+        changed = ~(np.abs(wanted - own) <= 0.5 * 10.0**-decimals)
+        texts, ends = fixed(wanted[changed], decimals[changed])
+        start, stop = start[changed], stop[changed]
+        return Edits(np.zeros(len(start), np.int8), start, stop, texts, ends)
+
     def _in_text(self, rows: Ints) -> Iterator[Edit]:
         """Edits of the targets of ``rows`` (K,), and of the auxiliary points of arcs."""
         task = self.task
         there = task.own[rows]
-        wanted, vias = task.wanted(rows, there), task.vias(there)
+        said = task.places.numbers(rows)
+        wanted, vias = task.wanted(said, rows, there), task.vias(there)
         for k, row in enumerate(rows.tolist()):
             text = task.text(row)
             if text.target is None:
                 raise ValueError(f"row {row} has no target")
-            own = task.places.numbers[row].tolist()
-            numbers = PointNumbers(own, wanted[k].tolist(), task.decimals(text.target, 7))
+            numbers = PointNumbers(said[k].tolist(), wanted[k].tolist(), task.decimals(text.target, 7))
             yield from self._point(row, text, text.target, numbers)
             if text.via is None:
                 continue
@@ -126,7 +147,7 @@ class _Writer:
     def _orientation(self, row: int) -> list[bytes]:
         """q1..q4 that an auxiliary point gets in numbers: those of the target, which count for nothing."""
         least = self.task.least[3:]
-        pairs = zip(self.task.places.numbers[row, 3:].tolist(), least, strict=True)
+        pairs = zip(self.task.places.numbers(np.array([row]))[0, 3:].tolist(), least, strict=True)
         return [fixed_one(value, count) for value, count in pairs]
 
     def _why_not_in_place(self, point: PointText, spots: list[tuple[int, int]]) -> str:
@@ -136,7 +157,7 @@ class _Writer:
             return "its target is computed"
         if point.name and point.name in self.task.places.read:
             return f"other code reads {shown} too"
-        if any(self.task.places.uses[start] > 1 for start, _ in spots):
+        if any(self.task.places.motions.uses(start) > 1 for start, _ in spots):
             return f"{shown or 'its target'} is shared by several motions"
         return ""
 

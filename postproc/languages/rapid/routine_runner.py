@@ -1,0 +1,184 @@
+"""Runs the blocks of a routine with what holds at its start, and joins what holds where its paths meet.
+
+A loop whose conditions are constants is run pass by pass, any other one until nothing changes any more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from postproc.languages.rapid.flow_graph import FlowGraph
+from postproc.languages.rapid.program_state import ProgramState
+
+UNROLLED = 10_000
+"""Statements in loops up to which these are run by themselves, in a run of a routine and what it calls; further ones
+are run together, each statement a few times."""
+NESTED = 1
+"""Loops in each other whose passes are not known and in which further loops are run pass by pass."""
+DEEPEST = 20
+"""Loops in each other that are run by themselves; those in them are run together."""
+
+After = Callable[[FlowGraph, int, ProgramState], list[tuple[int, ProgramState]]]
+
+
+class RoutineRunner:
+    """``after``: runs a block, and gives where it leads and what holds there; ``recording``: what runs is taken up."""
+
+    def __init__(self, after: After) -> None:
+        self._after = after
+        self.recording = False
+        self._left = 0  # statements and blocks that can still be run in loops
+        self._deep = 0  # loops in each other
+        self._unknown = 0  # loops that are run until nothing changes
+
+    def start(self) -> None:
+        """Starts a run of the program."""
+        self._left = UNROLLED
+
+    def run(self, graph: FlowGraph, state: ProgramState, recording: bool) -> ProgramState | None:
+        """The state after a routine; None where it does not come back."""
+        before, self.recording = self.recording, recording
+        ends: list[ProgramState] = []
+        try:
+            if graph.is_structured:
+                self._region(graph, 0, len(graph.blocks), state, ends)
+            else:
+                self._repeated(graph, 0, len(graph.blocks), state, ends)
+        finally:
+            self.recording = before
+        return _joined(ends)
+
+    def _region(
+        self, graph: FlowGraph, first: int, stop: int, state: ProgramState, ends: list[ProgramState]
+    ) -> ProgramState | None:
+        """Runs the blocks from ``first`` to before ``stop``, of which none goes back but loops; the state with which
+        they are left for others, None where they never are.  ends: the states with which the routine is left."""
+        starts = {first: state}
+        leaving: list[ProgramState] = []
+        at = first
+        while at < stop:
+            here = starts.pop(at, None)
+            after_loop = graph.loops.get(at)
+            if here is None:
+                at += 1
+                continue
+            if self._deep:
+                self._left -= 1 + len(graph.blocks[at].steps)
+            if after_loop is None:
+                led = self._after(graph, at, here.copy())
+                at += 1
+            else:
+                end = self._loop(graph, at, after_loop, here, ends)
+                led = [] if end is None else [(after_loop, end)]
+                at = after_loop
+            for there, after in led:
+                if there == -1:
+                    ends.append(after.copy())
+                elif first <= there < stop and there in starts:
+                    starts[there].join(after)
+                elif first <= there < stop:
+                    starts[there] = after.copy()
+                elif there >= 0:
+                    leaving.append(after.copy())
+        return _joined(leaving)
+
+    def _loop(
+        self, graph: FlowGraph, head: int, after: int, state: ProgramState, ends: list[ProgramState]
+    ) -> ProgramState | None:
+        """The state after a loop with its condition in the block ``head``; None where it is not left so."""
+        if self._deep >= DEEPEST:
+            return self._repeated(graph, head, after, state, ends)
+        self._deep += 1
+        try:
+            return self._passes(graph, head, after, state, ends)
+        finally:
+            self._deep -= 1
+
+    def _passes(
+        self, graph: FlowGraph, head: int, after: int, state: ProgramState, ends: list[ProgramState]
+    ) -> ProgramState | None:
+        """As ``_loop``, pass by pass as long as the condition is a constant."""
+        while True:
+            if self._left < 0:
+                return self._until_stable(graph, head, after, state, ends)
+            led = self._after(graph, head, state.copy())
+            if len(led) > 1:
+                return self._until_stable(graph, head, after, state, ends)
+            [(there, inside)] = led
+            if there == after:
+                return inside
+            back = self._region(graph, head + 1, after, inside, ends)
+            if back is None or back == state:
+                return None
+            state = back
+
+    def _until_stable(
+        self, graph: FlowGraph, head: int, after: int, state: ProgramState, ends: list[ProgramState]
+    ) -> ProgramState | None:
+        """As ``_loop``, where it is not known how often it runs."""
+        if self._unknown >= NESTED or self._left < 0:
+            return self._repeated(graph, head, after, state, ends)
+        state, before = state.copy(), self.recording
+        self._unknown += 1
+        try:
+            self.recording = False
+            while True:
+                inside, _ = self._entered(graph, head, after, state)
+                back = None if inside is None else self._region(graph, head + 1, after, inside, [])
+                if back is None or not state.join(back):
+                    break
+            self.recording = before
+            inside, end = self._entered(graph, head, after, state)
+            if inside is not None:
+                self._region(graph, head + 1, after, inside, ends)
+        finally:
+            self.recording = before
+            self._unknown -= 1
+        return end
+
+    def _entered(
+        self, graph: FlowGraph, head: int, after: int, state: ProgramState
+    ) -> tuple[ProgramState | None, ProgramState | None]:
+        """The states in which a loop is entered, and left, after its condition."""
+        led = dict(self._after(graph, head, state.copy()))
+        inside = led.get(head + 1)
+        end = led.get(after)
+        return (None if inside is None else inside.copy()), (None if end is None else end.copy())
+
+    def _repeated(
+        self, graph: FlowGraph, first: int, stop: int, state: ProgramState, ends: list[ProgramState]
+    ) -> ProgramState | None:
+        """As ``_region``, of blocks that go back in any way: each with what holds on all paths that lead to it."""
+        before, self.recording = self.recording, False
+        starts, pending = {first: state.copy()}, [first]
+        while pending:
+            at = min(pending)
+            pending.remove(at)
+            for there, after in self._after(graph, at, starts[at].copy()):
+                if not first <= there < stop:
+                    continue
+                if there not in starts:
+                    starts[there] = after.copy()
+                elif not starts[there].join(after):
+                    continue
+                if there not in pending:
+                    pending.append(there)
+        self.recording = before
+        leaving: list[ProgramState] = []
+        for at in sorted(starts):
+            for there, after in self._after(graph, at, starts[at].copy()):
+                if there == -1:
+                    ends.append(after.copy())
+                elif there >= 0 and not first <= there < stop:
+                    leaving.append(after.copy())
+        return _joined(leaving)
+
+
+def _joined(states: list[ProgramState]) -> ProgramState | None:
+    """What holds in all of them; None of none."""
+    if not states:
+        return None
+    found = states[0]
+    for other in states[1:]:
+        found.join(other)
+    return found
