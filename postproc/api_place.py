@@ -142,7 +142,7 @@ def assign(
 
 
 def stated_force(force: bool | str) -> str | None:
-    """As ``Request`` has it."""
+    """As ``Request`` has it.  Raises ValueError where it is empty."""
     if isinstance(force, str):
         if not force.strip():
             raise ValueError("force is empty; use True for the forces that belong to the program")

@@ -22,6 +22,15 @@ from postproc.toolpath import Role
 SAMPLES = np.linspace(-1.0, 1.0, 17)
 """Where the output's corner is evaluated: shares of the reach before and after its point."""
 
+FEW = np.linspace(-1.0, 1.0, 5)
+"""The same where the force changes over no ramp, as long as the tool is off by no more than ``CLOSE`` there."""
+
+CLOSE = 0.25
+"""Share of the tolerance."""
+
+ALWAYS = 32
+"""Corners that are evaluated closely in any case: those with the largest difference."""
+
 LITTLE = 0.1
 """Share of the tolerance: corners that round off less, of the original and of the output, are not evaluated."""
 
@@ -58,26 +67,47 @@ def compare_corners(task: CompensationProblem, result: CorrectionResult, divisio
 
 def compare_corners_at(task: CompensationProblem, division: Subdivision, motion: Ints) -> Corners:
     """The corners at the ends of ``motion`` (K,)."""
+    source = division.source[motion]
     unknown = np.isnan(approximations(task, division, motion))
+    distance, difference, angle = (np.zeros(len(motion)) for _ in range(3))
 
-    def compared(part: slice) -> tuple[Floats, Floats, Floats]:
-        some = motion[part]
-        return evaluate_corners(RoundedOutput(task, division, some), some)
+    def compare(some: Ints, samples: Floats) -> None:
+        def compared(part: slice) -> None:
+            at = some[part]
+            output = RoundedOutput(task, division, motion[at])
+            distance[at], difference[at], angle[at] = evaluate_corners(output, motion[at], samples)
 
-    parts = [(np.empty(0),) * 3, *in_blocks(compared, len(motion), rows=BLOCK)]
-    distance, difference, angle = (np.concatenate([part[i] for part in parts]) for i in range(3))
-    return Corners(motion, division.source[motion], distance, unknown, difference, angle)
+        each_block(compared, len(some), BLOCK)
+
+    close = np.zeros(len(motion), bool)
+    if task.force.ramps is not None:
+        ramp = task.force.ramps.row
+        close = np.isin(source, ramp) | np.isin(source + 1, ramp)
+    few = np.flatnonzero(~close)
+    compare(few, FEW)
+    size = np.fmax(difference / task.tolerance, angle / task.tolerance_angle)
+    close[few] = ~(size[few] <= CLOSE)
+    close[few[np.argsort(-size[few], kind="stable")[:ALWAYS]]] = True
+    compare(np.flatnonzero(close), SAMPLES)
+    return Corners(motion, source, distance, unknown, difference, angle)
 
 
-def evaluate_corners(output: RoundedOutput, motions: Ints) -> tuple[Floats, Floats, Floats]:
+def evaluate_corners(
+    output: RoundedOutput, motions: Ints, samples: Floats = SAMPLES
+) -> tuple[Floats, Floats, Floats]:
     """Of the corners at whose ends ``motions`` (K,) are: their reach (K,) [m], and how far (K,) [m] and (K,) [rad] the
-    tool is from the original's path there."""
+    tool is from the original's path there, at ``samples`` (S,) as ``SAMPLES``, and where these are ``SAMPLES`` closer
+    to the largest."""
     at = output.place(motions)
-    reach, later = output.reach[at], SAMPLES > 0
+    reach, later = output.reach[at], samples > 0
     segment = np.where(later, np.minimum(at + 1, len(output.extent) - 1)[:, None], at[:, None])
-    away = reach[:, None] * SAMPLES / output.extent[segment]
-    step = np.abs(away).max(axis=1) * (SAMPLES[1] - SAMPLES[0])
-    off, angle = output.peaks(segment, np.where(later, away, 1.0 + away), step[:, None])
+    away = reach[:, None] * samples / output.extent[segment]
+    share = np.where(later, away, 1.0 + away)
+    if samples is SAMPLES:
+        step = np.abs(away).max(axis=1) * (samples[1] - samples[0])
+        off, angle = output.peaks(segment, share, step[:, None])
+    else:
+        off, angle = output.peaks(segment, share, 0.0, closer=0)
     return reach, np.where(reach > 0, off, 0.0), np.where(reach > 0, angle, 0.0)
 
 

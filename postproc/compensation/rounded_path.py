@@ -131,11 +131,13 @@ class RoundedOutput:
         share = self.samples(at)
         return self.peaks(np.broadcast_to(at[:, None], share.shape), share, 0.5 / (len(BETWEEN) - 1))
 
-    def peaks(self, at: Ints, share: Floats, step: Floats | float) -> tuple[Floats, Floats]:
+    def peaks(
+        self, at: Ints, share: Floats, step: Floats | float, closer: int = CLOSER
+    ) -> tuple[Floats, Floats]:
         """(K,) [m] and (K,) [rad]: by how much the tool is off at most at the shares (K, S) of the segments ``at``
-        (K, S), and nearer and nearer around the largest: it is steep where the force changes fast."""
+        (K, S), and ``closer`` times nearer around the largest: it is steep where the force changes fast."""
         off, angle = np.zeros(len(at)), np.zeros(len(at))
-        for _ in range(CLOSER + 1):
+        for _ in range(closer + 1):
             found = self.deviations(at.ravel(), share.ravel())
             here, turned = (lengths(part).reshape(share.shape) for part in (found.shift, found.turn))
             off, angle = np.maximum(off, here.max(axis=1)), np.maximum(angle, turned.max(axis=1))

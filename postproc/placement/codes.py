@@ -113,9 +113,9 @@ CODES = define(
         "PLC014": Code(
             "warning",
             "turned programs are not written",
-            meaning="A turn of the tool along the path is worth it, or is not, but its programs are not written.",
+            meaning="A turn of the tool along the path has a gain, but its programs are not written.",
             consequence="The programs stay as they are.",
-            action="See the message.",
+            action="Remove the cause that the message names, or keep the programs as they are.",
             example="A force that is stated in the tool frame: it would turn with the tool, the real one does not.",
         ),
         "PLC016": Code(
@@ -129,7 +129,7 @@ CODES = define(
         "PLC017": Code(
             "warning",
             "part has no place",
-            meaning="There are fewer places than parts, or none of those that are left is feasible for this part.",
+            meaning="There are fewer places than parts, or none of those that remain is feasible for this part.",
             consequence="The part is not in the assignment.",
             action="See the message: it names the motion and the limit at the place that is nearest to feasible.",
             example="Four parts and three fixtures.",
@@ -139,7 +139,7 @@ CODES = define(
             "collision shapes are not used, or in part",
             meaning="A URDF has no shapes that could be checked, or its bodies touch before the program starts.",
             consequence="Collisions are not checked, or not of these pairs.",
-            action="See the message.",
+            action="Correct what the message names in the URDF, or name another one with --collisions.",
             example="A URDF whose joints count otherwise than the robot file.",
         ),
         "PLC019": Code(
@@ -155,13 +155,13 @@ CODES = define(
             "collision shapes cannot be used",
             meaning="The URDF that --collisions names has no shapes for this robot, or coal is not installed.",
             consequence="Collisions would not be checked, though it was asked for.",
-            action="See the message, or omit --collisions.",
+            action="Correct what the message names in the URDF, or omit --collisions.",
             example="A URDF of another robot.",
         ),
         "PLC015": Code(
             "info",
             "tool may turn along the path",
-            meaning="What a tool that turns about its spindle along the path brings, by the main job's own prediction.",
+            meaning="The message states what a tool that turns about its spindle brings, as the main job predicts.",
             consequence="The programs are rewritten only where --spin-output names a folder.",
             action="Write them if the gain is worth a longer motion of the wrist.",
             example="A gain of 8 % by 90 deg over a path of 2 m.",

@@ -54,7 +54,7 @@ class CollisionShapes:
     ignored: tuple[tuple[str, str], ...] = ()
 
     def configurations(self, q: Floats) -> Floats:
-        """(nq, M) Pinocchio's coordinates of the joint values ``q`` (M, n) [rad, m]; joints that the robot does not
+        """(M, C) Pinocchio's C coordinates of the joint values ``q`` (M, n) [rad, m]; joints that the robot does not
         have stay at zero."""
         import pinocchio as pin
 

@@ -134,7 +134,7 @@ def plan_spin(
     turn that are to be as good.
     """
     step = float(scan.angle[1] - scan.angle[0])
-    nodes = _Nodes.of(allowance, step)
+    nodes = _SpinNodes.of(allowance, step)
     still = len(scan.angle) // 2
     near = _widened(allowance, pinned, 0.5 * window + step)
     allowed = scan.feasible & (scan.error <= most)
@@ -154,7 +154,7 @@ def plan_spin(
 
 
 @dataclass(frozen=True, eq=False)
-class _Nodes:
+class _SpinNodes:
     """Places that lie within one step of allowance: first (N,) place of each; gap (N - 1,) steps to the next one;
     middle (N,) [rad] allowance; step [rad]."""
 
@@ -164,10 +164,10 @@ class _Nodes:
     step: float
 
     @staticmethod
-    def of(allowance: Floats, step: float) -> _Nodes:
+    def of(allowance: Floats, step: float) -> _SpinNodes:
         cell = np.floor(allowance / step).astype(np.int64)
         _, first = np.unique(cell, return_index=True)
-        return _Nodes(first, np.diff(cell[first]), np.asarray((cell[first] + 0.5) * step, float), step)
+        return _SpinNodes(first, np.diff(cell[first]), np.asarray((cell[first] + 0.5) * step, float), step)
 
     def smooth(self, turn: Floats, allowance: Floats, window: float) -> Floats:
         """(M,) ``turn`` (N,) at the places, averaged over ``window`` [rad] of allowance."""

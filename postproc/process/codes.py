@@ -297,10 +297,10 @@ FORCE_CODES = define(
             "info",
             "bias of logged forces",
             meaning=(
-                "A robot that yields cuts less than it is meant to, so forces that were logged without compensation"
+                "A robot that yields cuts less than it should, so forces that were logged without compensation"
                 " differ from those of the compensated robot. The log is used as it is."
             ),
-            consequence="The correction of first passes is too small, that of passes over what they left too large.",
+            consequence="The correction of first passes is too small, that of passes over what remains too large.",
             action="Log the forces of the compensated program and compensate the original again with them.",
             example="Logged on a robot of 1 um/N, finishing with ae 0.5 mm: 6 % too small.",
         ),

@@ -95,7 +95,8 @@ def shape_findings(shapes: CollisionShapes | Finding | None, prepared: Sequence[
         found.append(Finding("PLC018", message, shapes.file))
     for ready in prepared:
         if (hit := collision_of(shapes, ready)) is not None:
-            message = f"at the present place {hit.message.removeprefix('in this motion ')} in this motion"
+            what = hit.message.removeprefix("in this motion ")
+            message = f"at the present place this motion does not pass: {what}"
             found.append(Finding("PLC019", message, hit.file, hit.line))
     return found
 

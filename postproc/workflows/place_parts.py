@@ -115,7 +115,7 @@ def _without(pairs: list[Pair], objective: str, program: str) -> Finding:
         message = f"this part is feasible at no place; {lacks[0].message}"
         return Finding("PLC017", message, lacks[0].file, lacks[0].line)
     best = min(pairs, key=lambda pair: pair.value(objective))
-    message = f"this part is left without a place: another part lies better at {best.place}"
+    message = f"this part has no place: another part lies better at {best.place}"
     return Finding("PLC017", message, program)
 
 

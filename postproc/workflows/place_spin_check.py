@@ -13,6 +13,7 @@ from postproc.base.batches import each_block
 from postproc.base.findings import Finding, Refusal
 from postproc.base.units import DEG, MM
 from postproc.languages.dialect import WritingSettings
+from postproc.placement import codes as codes
 from postproc.workflows.preparation import Prepared
 
 SHARED_POINTS = "copy-inline"
@@ -103,4 +104,4 @@ def _refuse(ready: Prepared, rows: Ints, wrong: Bools, words: str) -> None:
 
 
 def _fail(file: str, words: str, line: int = 0) -> None:
-    raise Refusal(Finding("FIL008", f"the self-check of the turned tool failed: {words}", file, line))
+    raise Refusal(Finding("FIL008", f"the turned program does not pass its check: {words}", file, line))

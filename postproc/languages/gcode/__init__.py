@@ -18,7 +18,7 @@ from postproc.languages.dialect import (
     put_mark,
 )
 from postproc.languages.gcode import codes as codes
-from postproc.languages.gcode import detection, reader, subprogram_files, writer
+from postproc.languages.gcode import detection
 from postproc.languages.gcode.code_tables import FANUC, LINUXCNC
 from postproc.languages.gcode.control import Control
 from postproc.languages.gcode.kuka_cnc import CONTROL as KUKA_CNC
@@ -59,14 +59,20 @@ class GcodeDialect:
     def siblings(
         self, program: Program, settings: ReadingSettings, beside: Path | None = None
     ) -> tuple[Document, ...]:
+        from postproc.languages.gcode import subprogram_files
+
         return subprogram_files.find(program, settings, beside) if self.name != KUKA_CNC.name else ()
 
     def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
         raw = b"\n".join(one.raw for one in (documents[0], *settings.siblings))
         control = self.control if self.prepared is None else self.prepared(raw)
+        from postproc.languages.gcode import reader  # takes its time to load
+
         return reader.read(documents, control, settings)
 
     def edit_targets(self, program: Program, plan: Plan, writing: WritingSettings) -> EditedTargets:
+        from postproc.languages.gcode import writer
+
         return writer.edit_targets(program, plan, writing)
 
     def marked(self, program: Program, text: str) -> Edit:

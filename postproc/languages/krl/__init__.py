@@ -19,7 +19,6 @@ from postproc.languages.dialect import (
     put_mark,
 )
 from postproc.languages.krl import codes as codes
-from postproc.languages.krl import interpreter, siblings, writer
 
 _CLAIM = re.compile(
     rb"^(?:\xef\xbb\xbf)?[ \t]*(?:(?:GLOBAL[ \t]+)?DEF[ \t]+[A-Za-z_$][A-Za-z0-9_$]*[ \t]*(?:\(|;|\r?$)"
@@ -51,6 +50,8 @@ class KrlDialect:
         return sorted(matches, key=lambda p: p.stem != path.stem)[:1]
 
     def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
+        from postproc.languages.krl import interpreter  # takes its time to load
+
         return interpreter.read(
             documents,
             settings.references,
@@ -63,9 +64,13 @@ class KrlDialect:
     def siblings(
         self, program: Program, settings: ReadingSettings, beside: Path | None = None
     ) -> tuple[Document, ...]:
+        from postproc.languages.krl import siblings
+
         return siblings.find(program, settings, beside)
 
     def edit_targets(self, program: Program, plan: Plan, writing: WritingSettings) -> EditedTargets:
+        from postproc.languages.krl import writer
+
         return writer.edit_targets(program, plan, writing)
 
     def marked(self, program: Program, text: str) -> Edit:

@@ -17,7 +17,6 @@ from postproc.languages.dialect import (
     put_mark,
 )
 from postproc.languages.rapid import codes as codes
-from postproc.languages.rapid import module_reader, target_writer
 
 _MODULE = re.compile(
     rb"^(?:\xef\xbb\xbf)?[ \t]*+MODULE[ \t]++[A-Za-z][A-Za-z0-9_]*+[ \t]*+(?:\(|!|\r?$)", re.I | re.M
@@ -50,9 +49,13 @@ class RapidDialect:
         return ()
 
     def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
+        from postproc.languages.rapid import module_reader  # takes its time to load
+
         return module_reader.read(documents, settings)
 
     def edit_targets(self, program: Program, plan: Plan, writing: WritingSettings) -> EditedTargets:
+        from postproc.languages.rapid import target_writer
+
         return target_writer.edit_targets(program, plan, writing)
 
     def marked(self, program: Program, text: str) -> Edit:

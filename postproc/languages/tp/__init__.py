@@ -18,7 +18,6 @@ from postproc.languages.dialect import (
     put_mark,
 )
 from postproc.languages.tp import codes as codes
-from postproc.languages.tp import listing_reader, point_writer
 
 _PROGRAM = re.compile(rb"^(?:\xef\xbb\xbf)?[ \t]*+/PROG\b", re.I | re.M)
 _MAIN = re.compile(rb"^[ \t]*+/MN\b", re.I | re.M)
@@ -51,9 +50,13 @@ class TpDialect:
         return ()
 
     def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
+        from postproc.languages.tp import listing_reader  # takes its time to load
+
         return listing_reader.read(documents, settings)
 
     def edit_targets(self, program: Program, plan: Plan, writing: WritingSettings) -> EditedTargets:
+        from postproc.languages.tp import point_writer
+
         return point_writer.edit_targets(program, plan, writing)
 
     def marked(self, program: Program, text: str) -> Edit:

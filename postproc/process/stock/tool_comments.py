@@ -20,9 +20,10 @@ import numpy as np
 from postproc.base.units import DEG, MM
 from postproc.toolpath import Kind, Toolpath
 
-_NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+))"
+_NUMBER = r"([-+]?(?:\d++(?:\.\d*+)?|\.\d++))"
 _COMMENT = re.compile(
-    rf"\s*T(\d+)\s+D={_NUMBER}\s+CR={_NUMBER}(?:\s+TAPER={_NUMBER}\s*deg)?\s+-\s+ZMIN={_NUMBER}\s+-\s+([a-z ]+?)\s*",
+    rf"\s*T(\d+)\s+D={_NUMBER}\s+CR={_NUMBER}(?:\s+TAPER={_NUMBER}\s*deg)?"
+    rf"\s+-\s+ZMIN={_NUMBER}\s+-\s+([a-z]++(?: [a-z]++)*+)\s*",
     re.IGNORECASE,
 )
 _SHAPES = {"flat end mill": "flat", "ball end mill": "ball", "bullnose end mill": "bull", "drill": "drill"}
