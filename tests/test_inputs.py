@@ -276,6 +276,7 @@ ELSEWHERE = (
     "report/page.py",
     "robot/write_robot_file.py",
     "workflows/kinds.py",
+    "workflows/learn_history.py",
 )
 """What is read there is no input: standard streams, sources of the package, records, locks, heads of files that a batch
 looks at, parts of a page, results, files of other systems."""

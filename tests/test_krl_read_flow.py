@@ -237,3 +237,13 @@ def test_any_order_of_blocks_is_read(lines: list[str]) -> None:
         assert row < len(path)
     known = np.isfinite(path.position[:, 0])
     assert all(row in path.constraints.refused for row in range(len(path)) if not known[row])
+
+
+@pytest.mark.parametrize(
+    "opens", ["IF x THEN", "FOR I=1 TO 3", "WHILE x", "LOOP", "SWITCH x", "REPEAT", "SPLINE"]
+)
+def test_a_block_that_the_last_statement_opens_behind_a_return_is_read(opens: str) -> None:
+    """As where a file is cut off."""
+    text = f"DEF cut_off()\nLIN {{X 1,Y 2,Z 3,A 0,B 0,C 0}}\nIF x THEN\nRETURN\n{opens}"
+    document = Document(Path("cut_off.src"), text.encode("latin-1"))
+    assert len(KrlDialect().read((document,)).toolpath) == 1

@@ -47,7 +47,7 @@ def learned(tmp_path_factory):
     folder = tmp_path_factory.mktemp("once") / "shop"
     shutil.copytree(SAMPLE, folder)
     done = call(folder, "part.src", "part1.csv", "--json", "result.json", "--csv", "points.csv")
-    assert done.exit_code == 0, done.output
+    assert done.exit_code == 3, done.output  # its tolerance is finer than what its corners keep: COR006
     return folder, json.loads((folder / "result.json").read_text())
 
 
@@ -70,7 +70,7 @@ def with_rows(lines, change):
 def test_the_result_is_what_its_schema_says(learned):
     folder, result = learned
     jsonschema.validate(result, schema_of("learn"))
-    assert result["exit"] == 0
+    assert result["exit"] == 3
     assert all((folder / name).is_file() for name in result["outputs"])
     assert {
         "learned/part.src",

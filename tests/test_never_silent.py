@@ -183,16 +183,16 @@ def divisions(change: Callable[[Subdivision, np.ndarray, Poses], None]):
     """``change(division, moved, command)`` alters which motions of the output move, and where."""
 
     def breaks(monkeypatch) -> None:
-        real = program_module.subdivide
+        real = program_module.fit_corners  # the last that decides where the output goes
 
-        def divide(task, result, limits):
-            made = real(task, result, limits)
+        def divide(task, *rest):
+            result, made = real(task, *rest)
             moved, there = made.moved.copy(), made.command[np.arange(len(made))]
             command = Poses(there.rotation.copy(), there.position.copy())
             change(made, moved, command)
-            return replace(made, moved=moved, command=PoseRows(len(made), lambda rows: command[rows]))
+            return result, replace(made, moved=moved, command=PoseRows(len(made), lambda rows: command[rows]))
 
-        monkeypatch.setattr(program_module, "subdivide", divide)
+        monkeypatch.setattr(program_module, "fit_corners", divide)
 
     return breaks
 

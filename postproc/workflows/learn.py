@@ -11,6 +11,7 @@ import numpy as np
 
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import place
+from postproc.base.read_files import read_file
 from postproc.base.system import relative_path
 from postproc.base.units import MM
 from postproc.learning.attribution import Attribution, attribute
@@ -311,7 +312,7 @@ def _step(learned: Learned, record: Path, kept: Path | None) -> RecordedStep:
     step = RecordedStep(len(learned.data), learned.attribution.verdict, after, lower, upper)
     if kept is None:
         return step
-    digest = hashlib.sha256(kept.read_bytes()).hexdigest()
+    digest = hashlib.sha256(read_file(kept)).hexdigest()
     return replace(step, file=Path(relative_path(kept, record.parent)).as_posix(), sha256=digest)
 
 

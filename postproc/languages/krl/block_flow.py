@@ -45,7 +45,7 @@ class BlockFlow(OpenBlocks):
     def _open(self, pc: int, item: Statement, block: Block) -> int:
         run = self.run
         if not self.reachable and not block.has_labels:
-            return block.end
+            return max(block.end, pc + 1)  # one that the last statement opens has no other end
         if block.word in SPLINES:
             self._open_spline(item, block)
             return pc + 1
