@@ -11,11 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from postproc.base.geometry import Poses
 from postproc.compensation.corner_fit import corners_not_improved, fit_corners
-from postproc.compensation.corners import compare_corners, rounded_errors
+from postproc.compensation.corners import compare_corners, evaluate_corners, rounded_errors
 from postproc.compensation.correct import correct
 from postproc.compensation.path_comparison import evaluate_transitions
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.ramped_forces import add_force_ramps
+from postproc.compensation.rounded_path import RoundedOutput
 from postproc.compensation.subdivide import subdivide
 from postproc.compensation.subdivision import Limits, Subdivision
 from postproc.toolpath import EditConstraints, Kind, Role
@@ -139,6 +140,21 @@ def test_straight_on_where_the_force_steps_there_is_a_corner() -> None:
     assert found.difference[found.row == 2].max() > job.tolerance
     assert nearest(job, plain, 0.5e-3, 0.0) == pytest.approx(found.difference.max(), rel=0.05)
     assert worst(job, *fit_corners(job, result, plain, FREE)) < job.tolerance
+
+
+@pytest.mark.parametrize("at", [-0.8, -0.4, 0.4, 0.8])
+def test_a_corner_is_evaluated_before_and_after_its_point(at: float) -> None:
+    """At a share of the reach: on the motion that ends there, or on the next one."""
+    job = square(2e-3)
+    division = subdivide(job, correct(job), FREE)
+    motion = np.flatnonzero((division.source == 2) & (division.role == Role.ORIGINAL))
+    output = RoundedOutput(job, division, motion)
+    reach, off, _ = evaluate_corners(output, motion, np.array([at]))
+    segment = output.place(motion) + (at > 0)
+    away = abs(at) * reach / output.extent[segment]
+    expected = output.deviations(segment, away if at > 0 else 1.0 - away).shift
+    assert np.linalg.norm(expected) > 1e-7
+    np.testing.assert_allclose(off, np.linalg.norm(expected, axis=1), rtol=1e-6)
 
 
 def test_what_is_inserted_keeps_the_shortest_length() -> None:

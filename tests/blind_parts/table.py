@@ -10,7 +10,7 @@ import numpy as np
 SAMPLES = 2000
 
 TELLING = float(np.log(100.0))
-"""An effect can be told where the truth itself would be so much likelier (logarithm)."""
+"""An effect can be identified where the truth itself would be so much likelier (logarithm)."""
 
 
 def percent(value: float) -> str:
@@ -125,13 +125,13 @@ def _kind(name: str) -> str:
 
 
 def _names(answers: Sequence[dict[str, Any]]) -> list[str]:
-    """What is named, by what is hidden: all draws, and those in which it can be told at all."""
+    """What is named, by what is hidden: all draws, and those in which it can be identified at all."""
     seen = [one for one in answers if "named" in one]
     hidden = dict.fromkeys(tuple(one["hidden"]) for one in seen)
     heads = [*NAMES, "engagement", "drift"]
     text = [
         "",
-        "| hidden | draws | can be told % | of these right % | wrong name % of all | ambiguous % | unknown %"
+        "| hidden | draws | can be identified % | of these right % | wrong name % of all | ambiguous % | unknown %"
         " | named: " + " | ".join(heads) + " |",
         "| --- |" + " --- |" * (6 + len(heads)),
     ]
