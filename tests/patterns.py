@@ -6,7 +6,10 @@ import pkgutil
 import re
 import types
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
+
+from sources import parse_file, walk
 
 import postproc
 
@@ -18,13 +21,14 @@ USES = {
 Pattern = tuple[str, re.Pattern, str]  # where, the pattern, its use
 
 
+@cache
 def find_patterns() -> list[Pattern]:
     """Patterns of all modules, those compiled on import and those written inside of functions."""
     found: dict[tuple, Pattern] = {}
     trees = {}
     for module in _modules():
         source = Path(module.__file__ or "")
-        trees[module.__name__] = ast.parse(source.read_bytes())
+        trees[module.__name__] = parse_file(source)
     everywhere = _uses_of_names(trees.values())
     for module in _modules():
         here = _uses_of_names([trees[module.__name__]])
@@ -73,7 +77,7 @@ def _uses_of_names(trees: Iterable[ast.Module]) -> dict[str, set[str]]:
     """Uses by the last name of what is called: `_NAME.search(...)`, `lexing.NAME.match`."""
     uses: dict[str, set[str]] = {}
     for tree in trees:
-        for node in ast.walk(tree):
+        for node in walk(tree):
             if isinstance(node, ast.Attribute) and node.attr in USES:
                 owner = node.value
                 while isinstance(owner, ast.Subscript | ast.Call):
@@ -85,8 +89,9 @@ def _uses_of_names(trees: Iterable[ast.Module]) -> dict[str, set[str]]:
 
 def _written_in_functions(tree: ast.Module) -> Iterator[tuple[int, re.Pattern, str]]:
     """Patterns as literals of `re.match(...)` and the like; a part that is put in is a letter here."""
-    functions = [each for each in ast.walk(tree) if isinstance(each, ast.FunctionDef)]
-    for node in (inner for function in functions for inner in ast.walk(function)):
+    functions = [each for each in walk(tree) if isinstance(each, ast.FunctionDef)]
+    inside = {inner: None for function in functions for inner in walk(function)}  # one may lie in another
+    for node in inside:
         called = isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
         if not (called and getattr(node.func.value, "id", "") == "re" and node.args):
             continue
@@ -95,7 +100,7 @@ def _written_in_functions(tree: ast.Module) -> Iterator[tuple[int, re.Pattern, s
             continue
         flags = re.NOFLAG
         for each in [*node.args[1:], *(keyword.value for keyword in node.keywords if keyword.arg == "flags")]:
-            for part in ast.walk(each):
+            for part in walk(each):
                 if isinstance(part, ast.Attribute) and isinstance(getattr(re, part.attr, None), re.RegexFlag):
                     flags |= getattr(re, part.attr)
         yield node.lineno, re.compile(text, flags), USES.get(node.func.attr, "search")

@@ -6,6 +6,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
+from sources import parse_file, walk
 
 import postproc
 
@@ -109,14 +110,14 @@ def modules(root):
         parts = [root.name, *path.relative_to(root).with_suffix("").parts]
         if parts[-1] == "__init__":
             parts.pop()
-        found[".".join(parts)] = ast.parse(path.read_text(encoding="utf-8"), str(path))
+        found[".".join(parts)] = parse_file(path)
     return found
 
 
 def imports_of(module, tree, known):
     """Modules of the package that ``module`` imports, wherever in the file the import stands."""
     top = module.split(".")[0]
-    for node in ast.walk(tree):
+    for node in walk(tree):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -199,7 +200,7 @@ def test_no_two_classes_have_one_name():
     """Neither with an underscore before one of them: a reader who searches for a class finds one."""
     places: dict[str, list[str]] = {}
     for module, tree in modules(ROOT).items():
-        for node in ast.walk(tree):
+        for node in walk(tree):
             if isinstance(node, ast.ClassDef):
                 places.setdefault(node.name.lstrip("_"), []).append(module)
     assert len(places) > 300

@@ -27,6 +27,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from plant import kr270
+from sources import parse_file, walk
 
 import postproc
 from postproc.base.geometry import Poses, rotation_from_vector
@@ -133,7 +134,7 @@ class Source:
         self.trees = trees
         self.classes: dict[str, list[ast.ClassDef]] = {}
         for tree in trees.values():
-            for node in ast.walk(tree):
+            for node in walk(tree):
                 if isinstance(node, ast.ClassDef):
                     self.classes.setdefault(node.name, []).append(node)
 
@@ -190,7 +191,7 @@ class Source:
 def package() -> dict[str, ast.Module]:
     """The modules of the package by their paths."""
     paths = sorted(ROOT.rglob("*.py"))
-    return {path.relative_to(ROOT).as_posix(): ast.parse(path.read_text(encoding="utf-8")) for path in paths}
+    return {path.relative_to(ROOT).as_posix(): parse_file(path) for path in paths}
 
 
 @cache

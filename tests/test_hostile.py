@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from conftest import CELL, LINES
 from faults import TEMPORARY, Child, once, there
+from sources import parse, parse_file, walk
 
 import postproc
 from postproc.base.findings import Refusal
@@ -464,7 +465,7 @@ def banned(module: str) -> set[str]:
 
 def misdeeds(tree: ast.AST) -> set[str]:
     found = set()
-    for node in ast.walk(tree):
+    for node in walk(tree):
         if isinstance(node, ast.Import):
             found |= {name for alias in node.names for name in banned(alias.name)}
         elif isinstance(node, ast.ImportFrom) and not node.level:
@@ -484,7 +485,7 @@ def test_no_network_no_shell_no_objects_out_of_files():
     found = {
         (path.relative_to(root).as_posix(), what)
         for path in sorted(root.rglob("*.py"))
-        for what in misdeeds(ast.parse(path.read_text()))
+        for what in misdeeds(parse_file(path))
     }
     assert found == ALLOWED
 
@@ -499,4 +500,4 @@ def test_no_network_no_shell_no_objects_out_of_files():
     ],
 )  # fmt: skip
 def test_misdeeds_are_seen(text):
-    assert misdeeds(ast.parse(text))
+    assert misdeeds(parse(text))

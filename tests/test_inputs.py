@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from conftest import CELL
 from faults import Child, once, stray, there
+from sources import parse_file, walk
 
 import postproc
 from postproc.base.findings import Refusal
@@ -290,7 +291,7 @@ def test_whatever_is_read_is_noted():
         name = path.relative_to(root).as_posix()
         if name.startswith(ELSEWHERE):
             continue
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in walk(parse_file(path)):
             if isinstance(node, ast.Call):
                 called = getattr(node.func, "attr", getattr(node.func, "id", ""))
                 if called in READERS:

@@ -7,14 +7,15 @@ import time
 
 import pytest
 from linear import MB, MEGABYTES, SECONDS, all_cases, import_readers, measure
-from patterns import find_patterns
+from patterns import Pattern, find_patterns
 from regex_cost import find_ambiguity
 
 LARGE = {"postproc.languages.krl.scan._RUN", "postproc.languages.rapid.plain_lines._RUN"}
 """Lines of `_LINE` one after the other, all possessive: its line is looked at instead."""
 
-PATTERNS = [each for each in find_patterns() if each[0] not in LARGE]
 CASES = {f"{case.kind}: {case.name}": case for case in all_cases()}
+PARTS = 32
+"""Shares of the patterns, one a test."""
 RUNS = (*" \t0aA\"'{}([],.-=:;#/", "a ", "1,", "[0", "S ")
 
 
@@ -46,18 +47,23 @@ def test_the_cost_of_a_pattern(pattern, use, linear):
     assert (find_ambiguity(re.compile(pattern), use) is None) == linear
 
 
-@pytest.mark.parametrize("where", range(0, len(PATTERNS), 10))
-def test_no_pattern_costs_more_than_linear_time(where):
+def patterns() -> list[Pattern]:
+    """Of the package, in their order; asked for by a test, not while tests are collected."""
+    return [each for each in find_patterns() if each[0] not in LARGE]
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+def test_no_pattern_costs_more_than_linear_time(part):
     costly = {}
-    for name, pattern, use in PATTERNS[where : where + 10]:
+    for name, pattern, use in patterns()[part::PARTS]:
         if ambiguity := find_ambiguity(pattern, use):
             costly[name] = ambiguity
     assert not costly
 
 
 def test_all_modules_are_looked_at():
-    places = {name for name, _, _ in PATTERNS}
-    assert len(PATTERNS) > 120
+    places = {name for name, _, _ in patterns()}
+    assert len(patterns()) > 120
     assert {
         "postproc.languages.krl.lexing._ASSIGNMENT",
         "postproc.languages.gcode.kuka_cnc._SYSTEM",
@@ -86,10 +92,10 @@ def _texts(pattern: re.Pattern, size: int) -> list[str | bytes]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("where", range(0, len(PATTERNS), 10))
-def test_measured_time_of_patterns(where):
+@pytest.mark.parametrize("part", range(PARTS))
+def test_measured_time_of_patterns(part):
     """The judgement above, in time of the processor: quadratic time at 20,000 characters is more than a second."""
-    for name, pattern, use in PATTERNS[where : where + 10]:
+    for name, pattern, use in patterns()[part::PARTS]:
         for text in _texts(pattern, 20_000):
             assert _time(pattern, use, text) < 0.3, (name, text[:20])
 

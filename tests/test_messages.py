@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from sources import parse, walk
 
 import postproc
 from postproc.base.findings import CODES, SEVERITIES, Code, Finding, define
@@ -96,10 +97,6 @@ COMPOSED = {
 """Templates whose verb is in one of their values."""
 
 
-parse = cache(ast.parse)
-"""Of a source; most tests read all of them."""
-
-
 def flat(node):
     """The text of a string or f-string, each value of it as ``{}``; None for anything else."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
@@ -125,7 +122,7 @@ def choices(node, names):
 def assignments(function):
     """Name -> the texts that are assigned to it in a function, with what is appended (``+=``) to the last one."""
     names: dict[str, list] = {}
-    nodes = [node for node in ast.walk(function) if isinstance(node, ast.Assign | ast.AugAssign)]
+    nodes = [node for node in walk(function) if isinstance(node, ast.Assign | ast.AugAssign)]
     for node in sorted(nodes, key=lambda one: one.lineno):
         target = node.targets[0] if isinstance(node, ast.Assign) else node.target
         if not isinstance(target, ast.Name):
@@ -165,12 +162,12 @@ def collect(source):
     """(line, text) of the messages and helps of all findings, and of all exceptions, in a source text."""
     tree = parse(source)
     names: dict[ast.AST, dict] = {}
-    for function in ast.walk(tree):
+    for function in walk(tree):
         if isinstance(function, ast.FunctionDef):
             here = assignments(function)
-            names.update((node, here) for node in ast.walk(function))
+            names.update((node, here) for node in walk(function))
     found = set()
-    for node in ast.walk(tree):
+    for node in walk(tree):
         wanted = arguments(node) if isinstance(node, ast.Call) else []
         if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and not arguments(node.exc):
             wanted = [value for value in node.exc.args if " " in (flat(value) or "")]
@@ -183,14 +180,14 @@ def literals(source):
     """(line, text) of every text of a source but its docstrings and the help of command-line options."""
     tree = parse(source)
     skipped = set()
-    for node in ast.walk(tree):
+    for node in walk(tree):
         if isinstance(node, ast.Expr):
             skipped.add(node.value)
         elif isinstance(node, ast.JoinedStr):
             skipped.update(node.values)
         elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") in ("option", "argument"):
-            skipped.update(ast.walk(node))
-    found = [(node.lineno, flat(node)) for node in ast.walk(tree) if node not in skipped and flat(node)]
+            skipped.update(walk(node))
+    found = [(node.lineno, flat(node)) for node in walk(tree) if node not in skipped and flat(node)]
     return [(line, text) for line, text in found if " " in text.strip()]
 
 
@@ -276,7 +273,7 @@ def test_the_rooms_tables_are_apart_and_complete():
     named = {
         node.value
         for source in sources().values()
-        for node in ast.walk(parse(source))
+        for node in walk(parse(source))
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and CODE.match(node.value)
     }
     assert named == set(ALL)
@@ -303,7 +300,7 @@ def test_a_module_knows_the_codes_that_it_uses():
     for name, tree in names.items():
         wanted = graph.setdefault(name, set())
         wanted.update(".".join(name.split(".")[:k]) for k in range(1, name.count(".") + 1))
-        for node in ast.walk(tree):
+        for node in walk(tree):
             if isinstance(node, ast.ImportFrom):
                 wanted.add(str(node.module))
                 wanted.update(f"{node.module}.{alias.name}" for alias in node.names)

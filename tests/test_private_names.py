@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from sources import parse, walk
 
 FILES = sorted(Path(__file__).parent.rglob("*.py"))
 MODULES = sorted((Path(__file__).parents[1] / "postproc").rglob("*.py"))
@@ -26,8 +27,8 @@ def is_private(name: str) -> bool:
 
 def own_names(tree: ast.AST) -> set[str]:
     """Names that a class, or a module, gives to itself: its functions, and what is assigned to ``self`` and ``cls``."""
-    names = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef)}
-    for node in ast.walk(tree):
+    names = {node.name for node in walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    for node in walk(tree):
         if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store) and is_self(node.value):
             names.add(node.attr)
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
@@ -41,12 +42,12 @@ def is_self(node: ast.AST) -> bool:
 
 def private_uses(text: str) -> Iterator[tuple[int, str]]:
     """(line, name) of every use of a private name in Python source that another module or class gave."""
-    tree = ast.parse(text)
+    tree = parse(text)
     inside: dict[ast.AST, set[str]] = {}
-    for node in ast.walk(tree):
+    for node in walk(tree):
         if isinstance(node, ast.ClassDef):
-            inside.update(dict.fromkeys(ast.walk(node), own_names(node)))
-    for node in ast.walk(tree):
+            inside.update(dict.fromkeys(walk(node), own_names(node)))
+    for node in walk(tree):
         if isinstance(node, ast.Attribute) and is_private(node.attr):
             if is_self(node.value) and node.attr in inside.get(node, ()):
                 continue
@@ -124,7 +125,7 @@ def test_no_module_uses_a_private_name_of_another():
     found = []
     for path in MODULES:
         text = path.read_text(encoding="utf-8")
-        own = own_names(ast.parse(text)) | {"_replace"}
+        own = own_names(parse(text)) | {"_replace"}
         for line, name in private_uses(text):
             last = name.rpartition(".")[2]
             if last not in own and not name.startswith(("self.", "cls.")):

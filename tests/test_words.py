@@ -12,6 +12,7 @@ from pathlib import Path
 
 import click
 import pytest
+from sources import parse_file, walk
 
 import postproc
 from postproc.cli.main import COMMANDS, main
@@ -53,14 +54,14 @@ def former_words(text: str) -> list[str]:
 
 def strings(path: Path):
     """(line, text) of the strings of a module but for its docstrings, and the sides on which columns of tables are."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree = parse_file(path)
     bare = set()
-    for node in ast.walk(tree):
+    for node in walk(tree):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             bare.add(id(node.value))
         if isinstance(node, ast.keyword) and node.arg in ("justify", "title_justify"):
-            bare |= {id(inner) for inner in ast.walk(node.value)}
-    for node in ast.walk(tree):
+            bare |= {id(inner) for inner in walk(node.value)}
+    for node in walk(tree):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in bare:
             yield node.lineno, node.value
 

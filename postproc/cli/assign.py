@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import FAR, ROBOT, Out, ending, language_options, number, result_options, tare_option
-from postproc.cli.decimal_option import Decimal
+from postproc.cli.common import FAR, Out, number, result_options
+from postproc.cli.comparison_options import comparison_options
 
 Place = tuple[float, float, float, float]
 
@@ -29,7 +29,6 @@ def _places(_context: click.Context, _option: click.Parameter, texts: tuple[str,
 
 @click.command("assign")
 @click.argument("programs", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--force", metavar="[SPEC]", default=None, help="Machining force, as in the main job.")
 @click.option(
     "--at",
     "places",
@@ -40,47 +39,13 @@ def _places(_context: click.Context, _option: click.Parameter, texts: tuple[str,
     help="A place: origin of the base in $WORLD, mm, and turn about the vertical through it, deg, against the "
     "present. Once for each place.",
 )
-@click.option(
-    "--objective",
-    type=click.Choice(["across", "max", "p95", "uncertainty"]),
-    default="across",
-    show_default=True,
-    help="What is added up: the largest error across the feed; the largest error; the 95th percentile of all errors; "
-    "the uncertainty after compensation.",
-)
-@click.option(
-    "--limit-margin",
-    type=Decimal(0.0, 90.0),
-    default=5.0,
-    show_default=True,
-    metavar="DEG",
-    help="Distance of every turning axis from its limits.",
-)
-@click.option(
-    "--singularity-margin",
-    type=Decimal(0.0, 60.0),
-    default=5.0,
-    show_default=True,
-    metavar="DEG",
-    help="Distance from singularities, as an angle of A5.",
-)
-@click.option(
-    "--collisions",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE.urdf",
-    callback=ending(".urdf"),
-    help="Check collisions of the arm with itself and with fixed bodies by these shapes [the robot file's URDF].",
-)
-@click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cell's.")
-@language_options
-@tare_option
+@comparison_options
 @click.option(
     "--cells",
     type=click.Path(path_type=Path, file_okay=False),
     metavar="FOLDER",
     help="Write a cell file for each part that has a place, PROGRAM.cell.yaml [only report].",
 )
-@click.option("--strict", is_flag=True, help="Treat warnings as errors: then nothing is written.")
 @result_options
 def assign(
     programs: tuple[Path, ...],
@@ -104,7 +69,7 @@ def assign(
 
     Every part is predicted at every place, as the main job would; as many parts as possible get a feasible place, and
     the sum of their objectives is the least. Pairs that are not feasible are reported with motion and limit. Collisions
-    are not checked.
+    are checked where shapes are known (--collisions), else not, and the result says so.
 
     \b
     Examples:

@@ -8,17 +8,8 @@ from typing import Any, TypeVar
 
 import click
 
-from postproc.cli.common import (
-    FAR,
-    ROBOT,
-    Out,
-    ending,
-    language_options,
-    number,
-    page_option,
-    result_options,
-    tare_option,
-)
+from postproc.cli.common import FAR, Out, ending, number, page_option, result_options
+from postproc.cli.comparison_options import comparison_options
 from postproc.cli.decimal_option import Decimal
 
 Range = tuple[float, float]
@@ -46,12 +37,6 @@ def _range_option(name: str, about: str) -> Callable[[_Command], _Command]:
 
 @click.command("place")
 @click.argument("programs", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option(
-    "--force",
-    metavar="[SPEC]",
-    default=None,
-    help="Machining force, as in the main job.",
-)
 @_range_option("x", "Range of the base's origin in $WORLD, mm.")
 @_range_option("y", "The same for y.")
 @_range_option("z", "The same for z.")
@@ -60,47 +45,14 @@ def _range_option(name: str, about: str) -> Callable[[_Command], _Command]:
 )
 @_range_option("tool-turn", "Turn of the tool about its spindle, deg, against the present one.")
 @_range_option("track", "Range of the linear track that the cell puts in its place, mm.")
-@click.option(
-    "--objective",
-    type=click.Choice(["across", "max", "p95", "uncertainty"]),
-    default="across",
-    show_default=True,
-    help="What is small at a good place: the largest error across the feed, which marks the part; the largest error; "
-    "the 95th percentile of all errors; the uncertainty after compensation.",
-)
+@comparison_options
 @click.option(
     "--direction",
     type=Decimal(0.0, 90.0),
     metavar="DEG",
     help="Average the objective over force directions within this interval [force_ci95: direction_deg of the cell].",
 )
-@click.option(
-    "--limit-margin",
-    type=Decimal(0.0, 90.0),
-    default=5.0,
-    show_default=True,
-    metavar="DEG",
-    help="Distance of every turning axis from its limits.",
-)
-@click.option(
-    "--singularity-margin",
-    type=Decimal(0.0, 60.0),
-    default=5.0,
-    show_default=True,
-    metavar="DEG",
-    help="Distance from singularities, as an angle of A5.",
-)
 @click.option("--top", type=click.IntRange(1, 100), default=10, show_default=True, help="Places to list.")
-@click.option(
-    "--collisions",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE.urdf",
-    callback=ending(".urdf"),
-    help="Check collisions of the arm with itself and with fixed bodies by these shapes [the robot file's URDF].",
-)
-@click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cell's.")
-@language_options
-@tare_option
 @click.option(
     "-o",
     "--output",
@@ -128,7 +80,6 @@ def _range_option(name: str, about: str) -> Callable[[_Command], _Command]:
     help="Draw the objective over x and y, with the present and the best place.",
 )
 @page_option
-@click.option("--strict", is_flag=True, help="Treat warnings as errors: then nothing is written.")
 @result_options
 def place(
     programs: tuple[Path, ...],
@@ -162,8 +113,8 @@ def place(
     """Find where a part should lie: where PROGRAMS deflect the robot least, before any correction.
 
     No byte of the programs changes: the base moves in the cell file (`bases`), and the tool frame turns (`tools`);
-    --spin-output alone writes programs. The ranges of `room:` in the cell hold where no option states one. Collisions
-    are not checked.
+    --spin-output alone writes programs. The ranges of `room:` in the cell hold where no option states one.
+    Collisions are checked where shapes are known (--collisions), else not, and the result says so.
 
     \b
     Examples:
