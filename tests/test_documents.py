@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import documents
-import jsonschema
+import jsonschema_rs
 import pytest
 import yaml
 from documents import ROOT, Workplace, find_drifts, read_blocks, rewrite
@@ -182,7 +182,7 @@ def test_an_example_of_a_file_is_read(tmp_path, text, compensate):
         assert load_robot(path).effects
     else:
         assert name[1] == "job"
-        jsonschema.validate(yaml.safe_load(text), json.loads(compensate("schema", "job").out))
+        jsonschema_rs.validate(json.loads(compensate("schema", "job").out), yaml.safe_load(text))
 
 
 def test_the_table_of_effects_names_every_parameter():

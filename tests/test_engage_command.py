@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip("numba")
 
-import jsonschema
+import jsonschema_rs
 from click.testing import CliRunner
 
 from postproc.cli.main import main
@@ -72,7 +72,7 @@ def state(folder, text):
 def test_the_result_and_its_files(folder):
     out = call(folder, "--csv", folder / "out.csv", "--stock-out", folder / "out.stock", "--json", "-")
     result = json.loads(out.stdout)
-    jsonschema.validate(result, schema_of("engage"))
+    jsonschema_rs.validate(schema_of("engage"), result)
     assert result["removal_mm3"] == pytest.approx(100 * 16 * 5, rel=0.003)
     assert result["states"] == {"air": 3, "cut": 2, "collision": 0}
     assert result["collisions"] == []
@@ -127,7 +127,7 @@ def test_a_tool_without_teeth_is_geometry_only(folder):
     state(folder, STOCK + "tools:\n  1: {shape: flat, diameter: 16}\n")
     out = call(folder, "--json", "-", code=3)
     result = json.loads(out.stdout)
-    jsonschema.validate(result, schema_of("engage"))
+    jsonschema_rs.validate(schema_of("engage"), result)
     assert result["force"] == {"max_n": None, "mean_n": None, "ci95": None}
     assert [finding["code"] for finding in result["findings"]] == ["STK015", "STK017"]
     assert "teeth, helix, spindle, material" in result["findings"][0]["message"]
@@ -283,7 +283,7 @@ def test_the_main_job_reports_the_error_of_the_part(folder):
     result = CliRunner().invoke(main, ["program", str(folder / "part.ngc"), "--force=", "--json", "-"])
     assert result.exit_code in (0, 3), result.output
     report = json.loads(result.stdout)
-    jsonschema.validate(report, schema_of("report"))
+    jsonschema_rs.validate(schema_of("report"), report)
     part = report["part_error_mm"]
     across = report["across_feed_mm"]["before"]["max"]
     assert part["area_mm2"] == pytest.approx(100 * (16 + 2 * 5), rel=0.1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from itertools import pairwise
 
-import jsonschema
+import jsonschema_rs
 import numpy as np
 import pytest
 from external_plant import COMPLIANCE, Scene, beside, between, forward, log, pose, read
@@ -665,7 +665,7 @@ def test_axes_that_go_by_themselves_are_not_known(tmp_path, statement, known, ma
 
 
 def test_the_schema_knows_what_the_reader_reads():
-    check = jsonschema.Draft202012Validator(cell_schema())
+    check = jsonschema_rs.Draft202012Validator(cell_schema())
     good = [
         {"kind": "track", "direction": "+y", "limits": [0, 4000], "start": 5},
         {

@@ -5,7 +5,7 @@ import json
 import shutil
 from pathlib import Path
 
-import jsonschema
+import jsonschema_rs
 import numpy as np
 import pytest
 from blind_parts.cutting import aligned_rms, cut, probe, surface_of, write_csv
@@ -69,7 +69,7 @@ def with_rows(lines, change):
 
 def test_the_result_is_what_its_schema_says(learned):
     folder, result = learned
-    jsonschema.validate(result, schema_of("learn"))
+    jsonschema_rs.validate(schema_of("learn"), result)
     assert result["exit"] == 3
     assert all((folder / name).is_file() for name in result["outputs"])
     assert {

@@ -77,22 +77,20 @@ def _is_result(value: object) -> bool:
 
 def faults_of(result):
     """What of a result its schema does not take, in words."""
-    from jsonschema.exceptions import best_match
-
-    error = best_match(_validators()[result["command"]].iter_errors(result))
-    return [] if error is None else [f"{error.json_path}: {error.message[:300]}"]
+    errors = _validators()[result["command"]].iter_errors(result)
+    return [f"{'.'.join(map(str, error.instance_path))}: {error.message[:300]}" for error in errors]
 
 
 @cache
 def _validators():
     """Command as results name it -> validator."""
-    from jsonschema import Draft202012Validator
+    import jsonschema_rs
 
     from postproc.schemas import RESULT_SCHEMAS, schema_of
 
     schemas = [schema_of(name) for name in RESULT_SCHEMAS if name != "corrections"]
     return {
-        schema["anyOf"][0]["properties"]["command"]["const"]: Draft202012Validator(schema)
+        schema["anyOf"][0]["properties"]["command"]["const"]: jsonschema_rs.Draft202012Validator(schema)
         for schema in schemas
     }
 
