@@ -130,7 +130,7 @@ def test_a_tool_without_teeth_is_geometry_only(folder):
     jsonschema_rs.validate(schema_of("engage"), result)
     assert result["force"] == {"max_n": None, "mean_n": None, "ci95": None}
     assert [finding["code"] for finding in result["findings"]] == ["STK015", "STK017"]
-    assert "teeth, helix, spindle, material" in result["findings"][0]["message"]
+    assert "teeth, helix, spindle (or S in the program), material" in result["findings"][0]["message"]
 
 
 def test_collisions_have_their_line(folder):

@@ -149,7 +149,7 @@ def test_a_line_in_pieces_is_one_line():
 
     x = np.linspace(-30, 30, 61)
     short = sweeps_of(path_through(np.column_stack([x, 0.3 * x, 0 * x - 5])), BOX, FLAT)[1]
-    assert (short.head < np.arange(len(short.head))).mean() > 0.5
+    assert (short.stop > short.near).mean() > 0.5
     rng = np.random.default_rng(2)
     points = rng.uniform([-45, -20, -10], [45, 20, -0.1], (400, 3)) * MM
     for time in (1, 17, 60):
@@ -163,6 +163,34 @@ def test_a_line_in_pieces_is_one_line():
         assert np.minimum(pieces, reach)[outside] == pytest.approx(np.minimum(one, reach)[outside], abs=1e-12)
     # of the pieces the one beside the point
     assert nearest_sweep(short, 0.0105, 0.0105 * 0.3, -5e-3, 60, 1e-3)[1] == 40
+
+
+@pytest.mark.parametrize("slack", [0.0, 0.2 * MM])
+@pytest.mark.parametrize("cutter", [FLAT, BALL], ids=lambda cutter: cutter.shape)
+def test_no_list_leaves_out_a_motion_that_counts(cutter, slack):
+    """Distances by the lists of the cells are those to every motion, at any time of a zigzag of short motions."""
+    from part_cases import sweeps_of
+
+    from postproc.process.stock.cells import build_stock, stock_distance
+    from postproc.process.stock.distance import swept_distance
+
+    u = np.linspace(-40, 40, 41)
+    rows = [np.column_stack([u[::way], 0 * u + 5 * k, 0 * u - 3 - k]) for k, way in enumerate((1, -1, 1, -1))]
+    turn = np.array([[0.9, -0.436, 0], [0.436, 0.9, 0], [0, 0, 1]])
+    sweeps, stock = sweeps_of(path_through(np.concatenate(rows) @ turn.T), BOX, cutter)
+    listed, _ = build_stock(stock.blank, stock.sweeps, stock.cutters, 2 * MM, slack)
+    rng = np.random.default_rng(3)
+    points = rng.uniform([-45, -20, -10], [45, 30, -0.1], (150, 3)) * MM
+    seen = 0
+    for point, time in zip(points, rng.integers(1, len(stock.sweeps), 150), strict=True):
+        every = [swept_distance(stock.sweeps, stock.cutters, j, *point, 1.0) for j in range(time)]
+        found, true = stock_distance(listed, *point, time), min(every)
+        assert (found > 0) == (true > 0)
+        if 0 < true < listed.grid[1]:
+            assert found <= true + 1e-12
+            seen += found == pytest.approx(true, abs=1e-9)
+    assert seen > 5
+    assert len(sweeps.rows) == len(stock.sweeps)
 
 
 def test_points_lie_on_the_surface_and_the_mesh_holds_its_volume():

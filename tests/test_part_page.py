@@ -1,15 +1,21 @@
-"""The part on the page of a program: the numbers that its script draws, the table, and what a browser shows."""
+"""The part on the page of a program: the numbers that its script draws, the robot, and what a browser shows."""
 
 import base64
 import json
 import re
 import shutil
+import zlib
 
 import numpy as np
 import pytest
 
 pytest.importorskip("numba")
 
+from postproc.base.geometry import Poses
+from postproc.report.page import FOLDER
+from postproc.report.part_scene import robot_chain
+from postproc.robot.chain import Chain
+from postproc.robot.description import load_robot
 from postproc.workflows.preparation import Request
 from postproc.workflows.program import compensate
 
@@ -31,12 +37,44 @@ def numbers(data, name, form):
     return np.frombuffer(base64.b64decode(data[name]), form)
 
 
+def drawn(path, name="part-data"):
+    return json.loads(re.search(f'id="{name}">(.*?)</script>', path.read_text(encoding="utf-8"), re.S)[1])
+
+
+def followed(scene, base, values):
+    """The flange (4, 4) of the chain that the page draws, multiplied out joint by joint."""
+    whole = lambda rows: np.vstack([np.reshape(rows, (3, 4)), [0, 0, 0, 1]])  # noqa: E731
+    at = whole(base)
+    for joint in scene["joints"]:
+        value = sum(ratio * values[column] for column, ratio in joint["follows"])
+        move = np.eye(4)
+        if joint["turns"]:
+            move[:2, :2] = [[np.cos(value), -np.sin(value)], [np.sin(value), np.cos(value)]]
+        else:
+            move[2, 3] = value
+        at = at @ whole(joint["placement"]) @ move
+    return at @ whole(scene["flange"])
+
+
+@pytest.mark.parametrize("name", ["kuka_kr270", "fanuc_m900ib_700"])
+def test_the_drawn_chain_is_that_of_the_robot(name, pytestconfig):
+    robot = load_robot(pytestconfig.rootpath / "robots" / f"{name}.yaml")
+    values = np.random.default_rng(1).uniform(-1, 1, len(robot.joints))
+    chain = Chain(robot.joints, robot.flange)
+    coordinates = np.zeros((chain.size, 1))
+    coordinates[chain.motor_rows, 0] = values
+    pose = chain.evaluate(coordinates, Poses.identity()).pose
+    flange = followed(robot_chain(robot), [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0], values)
+    np.testing.assert_allclose(flange[:3, 3] / 1000, pose.position[0], atol=1e-8)
+    np.testing.assert_allclose(flange[:3, :3], pose.rotation[0], atol=1e-8)
+
+
 @pytest.mark.slow
 def test_what_the_script_draws_is_what_the_report_says(page):
     path, report = page
     text = path.read_text(encoding="utf-8")
     assert len(text) < 10e6
-    data = json.loads(re.search(r'id="part-data">(.*?)</script>', text, re.S)[1])
+    data = drawn(path)
     part = report.as_json()["part_error_mm"]
     places = numbers(data, "vertices", "<u2").reshape(-1, 4)[:, :3]
     errors = numbers(data, "errors", "<i2").reshape(-1, 2).astype(float)
@@ -58,30 +96,145 @@ def test_what_the_script_draws_is_what_the_report_says(page):
 
 
 @pytest.mark.slow
-def test_a_browser_shows_the_part(page, request):
-    """As a picture where WebGL is missing, else drawn; as posted its floor is blue, too deep by more than twice the
-    tolerance."""
-    browser = request.getfixturevalue("chromium")
-    window = browser.new_page(viewport={"width": 1100, "height": 900})
-    errors = []
-    window.on("pageerror", lambda error: errors.append(str(error)))
-    window.goto(page[0].as_uri())
-    drawn = not window.eval_on_selector("#part-live", "e => e.hidden")
-    assert window.eval_on_selector("#part-static", "e => e.hidden") == drawn
-    if drawn:
-        window.evaluate(
-            "const s = document.getElementById('part-side'); s.value = 0; s.dispatchEvent(new Event('input'))"
-        )
-        window.wait_for_timeout(500)
-    import io
+def test_robot_tool_and_path_are_where_the_program_has_them(page):
+    """The flange of the drawn robot carries the tool of the cell to the programmed point, motion by motion."""
+    path, _ = page
+    scene = drawn(path)["scene"]
+    columns = drawn(path, "data")["columns"]
+    points = np.frombuffer(base64.b64decode(columns["position"]["base64"]), "<f4").reshape(-1, 3)
+    values = numbers(scene, "joint_values", "<f4").reshape(len(points), -1)
+    axes = numbers(scene, "axes", "<i2").reshape(-1, 3) / 32767
+    frame = np.reshape(scene["frame"], (3, 4))
+    turn = np.radians(30)
+    spindle = np.array([np.sin(turn), 0, np.cos(turn)])  # b: 30 of both tools in cell.yaml
+    for i in (1, 10, 27, 60, len(points) - 1):
+        length = {1: 250, 2: 240}[scene["numbers"][numbers(scene, "cutter", "<u1")[i]]]
+        flange = followed(scene, scene["robot"], values[i])
+        tip = flange @ [120, 0, length, 1]
+        wanted = frame[:, :3] @ points[i] + frame[:, 3]
+        np.testing.assert_allclose(tip[:3], wanted, atol=0.002)
+        np.testing.assert_allclose(-flange[:3, :3] @ spindle, axes[i], atol=1e-4)
+    # the path: its ends are the programmed points of part.ngc, in the axes of the stock
+    packed = scene["path"]
+    raw = np.frombuffer(zlib.decompress(base64.b64decode(packed["data"])), np.uint8).astype(int)
+    steps = raw.reshape(3, 2, packed["count"])
+    grid = np.cumsum(steps[:, 0] + 256 * steps[:, 1], axis=1).T % 65536
+    places = np.array(packed["low"]) + grid / 65535 * packed["size"]
+    program = [[-20, 4, 30], [-12, 4, 30], [-12, 4, -4], [132, 4, -4], [132, 14, -4]]
+    np.testing.assert_allclose(places[:5], program, atol=0.01)
 
-    from PIL import Image
 
-    shot = window.locator("#part" if drawn else "#part-static img >> nth=0").screenshot()
-    pixels = np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")).astype(int)
-    blue = (pixels[..., 2] > 2 * pixels[..., 0]) & (pixels[..., 2] > 60)
-    grey = (np.ptp(pixels, axis=2) < 6) & (pixels[..., 0] > 60) & (pixels[..., 0] < 200)
-    assert blue.mean() > 0.05
-    assert grey.mean() > 0.1
-    assert not errors
-    window.close()
+SET = """([id, value]) => {
+  const input = document.getElementById(id);
+  input.value = value;
+  input.dispatchEvent(new Event('input'));
+}"""
+
+
+def changed(one, other):
+    return int((np.abs(one - other).sum(axis=2) > 60).sum())
+
+
+def blue(pixels):
+    """The share of what is too deep by more than the tolerance."""
+    r, g, b = np.moveaxis(pixels, 2, 0)
+    return ((b > 2 * r) & (b > 1.3 * g) & (b > 60)).mean()
+
+
+def green(pixels):
+    """Places (K, 2) of the arrow."""
+    r, g, b = np.moveaxis(pixels, 2, 0)
+    return np.argwhere((g > 1.6 * r) & (g > 1.25 * b) & (g > 70))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("wide", "scheme"), [(1400, "light"), (390, "dark")])
+def test_a_browser_shows_part_robot_and_force(window, page, wide, scheme):
+    size = {"width": wide, "height": 800}
+    shown = window(page[0], viewport=size, color_scheme=scheme, bypass_csp=True)
+    web = shown.page
+    if web.eval_on_selector("#part-live", "e => e.hidden"):
+        pytest.skip("this Chromium has no WebGL 2")
+    assert web.evaluate("document.documentElement.scrollWidth") <= wide
+    assert shown.violations() == []
+    # as posted the wall is blue, too deep by more than twice the tolerance; as compensated nothing is
+    web.evaluate(SET, ["part-side", 0])
+    posted = shown.pixels("#part")
+    web.evaluate(SET, ["part-side", 1])
+    after = shown.pixels("#part")
+    assert blue(posted) > 0.02
+    assert blue(after) < 0.0005
+    # the arrow is there, and turns with the motion: line 12 goes back along X, line 10 forth
+    heads = {}
+    for line in (10, 12):
+        web.fill("#line", str(line))
+        web.keyboard.press("Tab")
+        assert web.locator("#part-line").inner_text().startswith(f"line {line}: G1")
+        arrow = green(shown.pixels("#part"))
+        assert len(arrow) > 100
+        thin = np.cov(arrow.T)
+        heads[line] = np.degrees(np.arctan2(2 * thin[0, 1], thin[1, 1] - thin[0, 0])) / 2
+    assert abs(heads[10] - heads[12]) > 20
+    web.uncheck("#part-force")
+    assert len(green(shown.pixels("#part"))) == 0
+    # the robot fills the view on demand, is above and beside the part, and goes away
+    web.click("#part-cell")
+    robot = shown.pixels("#part")
+    web.uncheck("#part-robot")
+    assert changed(robot, shown.pixels("#part")) > 0.03 * robot.shape[0] * robot.shape[1]
+    assert not [said for said in shown.complaints if "GPU stall" not in said]
+
+
+@pytest.mark.slow
+def test_playing_along_the_path(window, page):
+    shown = window(page[0], viewport={"width": 900, "height": 700})
+    web = shown.page
+    if web.eval_on_selector("#part-live", "e => e.hidden"):
+        pytest.skip("this Chromium has no WebGL 2")
+    at = lambda: int(web.input_value("#part-motion"))  # noqa: E731
+    web.evaluate(SET, ["part-motion", 2])
+    web.evaluate(SET, ["part-speed", 70])
+    first = shown.pixels("#part")
+    web.focus("#part")
+    web.keyboard.press(" ")
+    assert web.inner_text("#part-play") == "pause"
+    web.wait_for_function("() => +document.getElementById('part-motion').value > 8")
+    web.keyboard.press(" ")
+    there = at()
+    assert there == int(web.input_value("#motion"))  # one motion is chosen in all figures
+    assert changed(first, shown.pixels("#part")) > 500
+    shown.frames(10)
+    assert at() == there
+    web.keyboard.press("n")
+    assert at() == there + 1
+    web.keyboard.press("r")
+    assert not shown.complaints or all("GPU stall" in said for said in shown.complaints)
+
+
+@pytest.mark.slow
+def test_without_webgl_there_is_a_picture(window, page, tmp_path):
+    text = page[0].read_text(encoding="utf-8")
+    policy = re.compile(r'<meta http-equiv="Content-Security-Policy"[^>]*>')
+    blind = "<script>HTMLCanvasElement.prototype.getContext = (get => function (kind, ...more) {"
+    blind += " return kind === 'webgl2' ? null : get.call(this, kind, ...more); })"
+    blind += "(HTMLCanvasElement.prototype.getContext);</script>"
+    (tmp_path / "x.html").write_text(policy.sub(blind, text, count=1), encoding="utf-8")
+    shown = window(tmp_path / "x.html")
+    assert shown.page.eval_on_selector("#part-live", "e => e.hidden")
+    pixels = shown.pixels("#part-static img >> nth=0")
+    assert blue(pixels) > 0.02
+    assert shown.complaints == []
+
+
+@pytest.mark.slow
+def test_the_browser_follows_the_same_chain(window, page):
+    """Joint angles to flange: the page's script against the chain multiplied out here."""
+    shown = window(page[0])
+    scene = drawn(page[0])["scene"]
+    script = (FOLDER / "robot.js").read_text(encoding="utf-8")
+    values = numbers(scene, "joint_values", "<f4").reshape(-1, scene["columns"])[40].astype(float)
+    code = "([chain, values]) => { " + script + "; return jointFrames(chain, chain.robot, values).flange; }"
+    flange = shown.page.evaluate(code, [scene, values.tolist()])
+    np.testing.assert_allclose(
+        np.reshape(flange, (3, 4)), followed(scene, scene["robot"], values)[:3], atol=1e-6
+    )

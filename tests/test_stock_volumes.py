@@ -59,3 +59,46 @@ def test_random_programs_remove_what_the_solids_say(cutter, seed):
     axes = np.broadcast_to(axis if seed == 2 else [0.0, 0, 1], (8, 3))
     cut = run(path_through(points, axes, [Kind.PTP] + [Kind.LIN] * 7), block(LOW, HIGH), cutter)
     assert cut.volume.sum() / MM**3 == pytest.approx(volume_by_solids(points, axes, cutter), rel=0.01)
+
+
+def five_axis(seed, cutter):
+    """Removed volumes [mm3] of 8 random motions that turn the spindle: by the simulation, and by solids of 10 steps."""
+    random = np.random.default_rng(seed)
+    points = random.uniform([5, 5, -8], [55, 35, 0], (9, 3))
+    points[1:] = points[:-1] + np.clip(points[1:] - points[:-1], -15, 15)
+    lean = np.clip(np.cumsum(random.normal(0, 0.06, (9, 2)), axis=0), -0.4, 0.4)
+    axes = np.column_stack([lean, np.ones(9)])
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    cut = run(path_through(points, axes, [Kind.PTP] + [Kind.LIN] * 8), block(LOW, HIGH), cutter)
+    fine, turned = [points[0]], [axes[0]]
+    for k in range(8):
+        angle = np.arccos(np.clip(axes[k] @ axes[k + 1], -1, 1))
+        for share in np.arange(1, 11) / 10:
+            fine.append(points[k] + share * (points[k + 1] - points[k]))
+            spread = np.array([np.sin((1 - share) * angle), np.sin(share * angle)]) / np.sin(angle)
+            turned.append(spread @ axes[k : k + 2])
+    return cut.volume.sum() / MM**3, volume_by_solids(fine, turned, cutter)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cutter", [FLAT, BALL, BULL], ids=lambda cutter: cutter.shape)
+def test_turning_motions_remove_what_the_solids_say(cutter):
+    found, solid = five_axis(1, cutter)
+    assert found == pytest.approx(solid, rel=0.01)
+
+
+def main():
+    """Prints the volumes of 200 random five-axis motions, 8 each."""
+    worst = 0.0
+    for seed in range(25):
+        cutter = (FLAT, BALL, BULL)[seed % 3]
+        found, solid = five_axis(seed, cutter)
+        worst = max(worst, abs(found / solid - 1))
+        print(
+            f"{cutter.shape:5} {found:9.1f} {solid:9.1f} mm3  {100 * (found / solid - 1):+.3f} %", flush=True
+        )
+    print(f"200 motions, largest difference {100 * worst:.3f} %")
+
+
+if __name__ == "__main__":
+    main()

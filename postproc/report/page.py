@@ -25,6 +25,7 @@ from postproc import __version__
 from postproc.base.findings import CODES, Finding
 from postproc.base.system import relative_path
 from postproc.compensation.correct import MotionOutcome
+from postproc.compensation.problem import CompensationProblem
 from postproc.part.part_figures import PartError
 from postproc.report.page_data import PageData
 from postproc.report.page_words import (
@@ -36,7 +37,7 @@ from postproc.report.page_words import (
     program_verdict,
     reasons,
 )
-from postproc.report.part_page import part_data, part_section
+from postproc.report.part_page import oblique_yaw, part_data, part_section
 from postproc.toolpath import Kind
 
 FOLDER = Path(__file__).parent / "html"
@@ -45,22 +46,35 @@ FINDINGS = 300
 """A page shows so many findings at most; all are in the JSON."""
 
 SCRIPTS = ("figures.js", "space.js", "hands.js", "chart.js", "listing.js", "program.js", "tables.js")
+PART = ("robot.js", "part.js", "play.js")
 TABLES = ("tables.js",)
-"""Scripts of a page of a program, and of every other."""
+"""Scripts of a page of a program, with a part, and of every other page."""
 STYLE = "page.css"
 
 _SEVERITY = {"info": ("i", "note"), "warning": ("!", "warning"), "error": ("x", "error")}
 
 
-def program_page(data: PageData, links: Mapping[str, str], part: PartError | None = None) -> bytes:
-    """The page of one program.  links: what is beside it, words -> relative path."""
+def program_page(
+    data: PageData,
+    links: Mapping[str, str],
+    part: PartError | None = None,
+    task: CompensationProblem | None = None,
+) -> bytes:
+    """The page of one program.  links: what is beside it, words -> relative path; part, task: its part, and the
+    problem with whose robot that is shown."""
     report = data.report
     shown = None
-    if part is not None:
-        shown = {**part_section(part, report.uncertainty), "data": embedded(part_data(part))}
+    if part is not None and task is not None:
+        from postproc.report.part_scene import part_scene  # numba: only where there is a stock
+
+        scene = part_scene(task, data.rows)
+        section = part_section(part, report.uncertainty, oblique_yaw(part, scene["robot"]))
+        path = scene["path"]
+        thinned = f"{path['count']} of {path['all']}" if path["count"] < path["all"] else ""
+        shown = {**section, "thinned": thinned, "data": embedded(part_data(part, scene))}
     return rendered(
         "program.html.j2",
-        scripts=SCRIPTS if part is None else (*SCRIPTS, "part.js"),
+        scripts=SCRIPTS if shown is None else (*SCRIPTS, *PART),
         part=shown,
         title=Path(report.program).name,
         program=report.program,

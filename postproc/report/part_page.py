@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from postproc.report.part_report import SIDES, posted_sentence, side_sentence
 WIDE, HIGH = 640, 400
 """Pixels of a static picture."""
 
-_YAW, _PITCH = 0.6, 0.6
+_BESIDE, _PITCH = 0.66, 0.6  # rad: the reader stands opposite to the robot, to one side of it and above
 _LIGHT = np.array([0.3, 0.5, 0.8]) / np.linalg.norm([0.3, 0.5, 0.8])
 _EACH = (
     np.array([[2, 1, 1], [1, 2, 1], [1, 1, 2], [4, 0, 0], [0, 4, 0], [0, 0, 4]]) / 4
@@ -30,14 +30,14 @@ _NOTHING = -32768  # of what the program does not make
 SIDE_WORDS = {"before": "as posted", "after": "as compensated"}
 
 
-def part_section(part: PartError, uncertainty: Uncertainty) -> dict[str, object]:
-    """What ``part.html.j2`` shows, but for the ``data`` of its script (``part_data``)."""
+def part_section(part: PartError, uncertainty: Uncertainty, yaw: float) -> dict[str, object]:
+    """What ``part.html.j2`` shows, but for the ``data`` of its script (``part_data``); ``yaw``: of the view."""
     figures = part.figures
     sides = [side for side in (part.before, part.after) if side is not None]
     pictures = []
     for (name, _), side in zip(figures.sides, sides, strict=True):
         colours = band_colours(part.vertex_errors(side), figures.tolerance)
-        pictures.append((SIDE_WORDS[name], _png(_picture(part, colours))))
+        pictures.append((SIDE_WORDS[name], _png(_picture(part, colours, yaw))))
     sentences = [
         f"{SIDES[name].capitalize()}: {side_sentence(side, figures.tolerance, uncertainty)}."
         for name, side in figures.sides
@@ -53,8 +53,17 @@ def part_section(part: PartError, uncertainty: Uncertainty) -> dict[str, object]
     }
 
 
-def part_data(part: PartError) -> dict[str, object]:
-    """What ``part.js`` draws: places in 65,535ths of the extent, errors in 32,767ths of the range [mm]."""
+def oblique_yaw(part: PartError, robot: Sequence[float]) -> float:
+    """[rad] The turn of the view about z in which the part hides the robot, not the robot the part; ``robot``: the pose
+    of its base in the axes of the stock, as of ``part_scene``."""
+    vertices = part.surface.vertices
+    x, y = (0.5 * (vertices.min(axis=0) + vertices.max(axis=0)) / MM)[:2] - np.array([robot[3], robot[7]])
+    return float(np.arctan2(y, x)) + _BESIDE
+
+
+def part_data(part: PartError, scene: Mapping[str, Any]) -> dict[str, object]:
+    """What ``part.js`` draws: places in 65,535ths of the extent, errors in 32,767ths of the range [mm]; ``scene``: what
+    stands around the part (``part_scene``)."""
     vertices, tolerance = part.surface.vertices, part.figures.tolerance
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     extent = np.maximum(high - low, 1e-9)
@@ -73,6 +82,9 @@ def part_data(part: PartError) -> dict[str, object]:
         "faces": _text(part.surface.faces.astype("<u4")),
         "corners": part.surface.faces.size,
         "extent": np.round(extent / MM, 4).tolist(),
+        "middle": np.round(middle / MM, 4).tolist(),
+        "yaw": oblique_yaw(part, scene["robot"]),
+        "scene": dict(scene),
         "range": span / MM,
         "tolerance": tolerance / MM,
         "bands": BANDS[:, :3].tolist(),
@@ -115,10 +127,10 @@ def _cells(figures: ErrorFigures) -> dict[str, str]:
     }
 
 
-def _picture(part: PartError, colours: Any) -> Any:
+def _picture(part: PartError, colours: Any, yaw: float) -> Any:
     """(HIGH, WIDE, 4) the part in parallel projection, seen as the page's script shows it first."""
     surface = part.surface
-    c, s, cp, sp = np.cos(_YAW), np.sin(_YAW), np.cos(_PITCH), np.sin(_PITCH)
+    c, s, cp, sp = np.cos(yaw), np.sin(yaw), np.cos(_PITCH), np.sin(_PITCH)
     view = np.array([[c, s, 0], [-s * sp, c * sp, cp], [s * cp, -c * cp, sp]])
     low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
     seen = (surface.vertices - 0.5 * (low + high)) @ view.T

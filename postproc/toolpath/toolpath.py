@@ -77,6 +77,7 @@ class Toolpath(MotionColumns):
     ``external`` (N, 6) [mm or deg, as in the text]: external axes E1..E6 at the end of each motion; NaN where nothing
     has stated them yet, ``COMPUTED`` or ``LOST`` where they are not known.
     ``feed`` (N,) [m/s]: NaN where it is not known.
+    ``spindle`` (N,) [rad/s]: the speed of the spindle, as the program states it; NaN where it does not, or varies.
     ``inverse_time_feed`` (N,): the text gives the time that the motion takes, its feed follows from its length (G93).
     ``base``, ``tool`` (N,): index into ``frames``, -1 where it is not known.
     ``line`` (N,): from 1.
@@ -113,6 +114,7 @@ class Toolpath(MotionColumns):
     approximation: Floats = field(default_factory=not_given, metadata=column(default=0.0))
     stops: Bools = field(default_factory=not_given)
     continues: Bools = field(default_factory=not_given, metadata=column(dtype=np.bool_, default=True))
+    spindle: Floats = field(default_factory=not_given, metadata=column(default=np.nan))
     inverse_time_feed: Bools = field(
         default_factory=not_given, metadata=column(dtype=np.bool_, default=False)
     )

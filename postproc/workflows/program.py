@@ -76,9 +76,8 @@ def predict(request: Request, stage: Stage = silent) -> Report:
     _not_over_inputs(ready, report.outputs)
     if shown:
         links = beside(shown, {"deflections (CSV)": names[0], "result (JSON)": pages[-1]})
-        files[shown] = program_page(
-            page_data(ready.task, result, report, ready.program.documents), links, part
-        )
+        drawn = page_data(ready.task, result, report, ready.program.documents)
+        files[shown] = program_page(drawn, links, part, ready.task)
     ready.inputs.refuse_changed()
     write_atomically({**files, **dict.fromkeys(pages, json_bytes(report))}, still=ready.inputs.refuse_changed)
     return report
@@ -188,6 +187,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
                 },
             ),
             part,
+            task,
         ),
         **dict.fromkeys(names[4:], json_bytes(report)),
     }

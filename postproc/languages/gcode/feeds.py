@@ -1,4 +1,4 @@
-"""Feeds: F in a minute, in a turn of the spindle, or as the inverse of a block's time."""
+"""Feeds: F in a minute, in a turn of the spindle, or as the inverse of a block's time; and the speed of the spindle."""
 
 from __future__ import annotations
 
@@ -62,6 +62,19 @@ class Feeds:
         result = np.where(here == Feed.INVERSE_TIME, timed, result)
         result[here < 0] = np.nan
         return np.asarray(result / 60.0)
+
+    def speeds(self, blocks: Ints) -> Floats:
+        """(N,) [rad/s] of the spindle in blocks of the program (N,): the S that is in force; NaN where none is, at a
+        constant surface speed, after M5, and where an S may be the limit of a block that shifts the origin (G92 S)."""
+        column, keep = self._spindle, ~self._given.modal.has(Once.SHIFT)[self._spindle.block]
+        stated = WordColumn(column.block[keep], column.value[keep], column.how[keep])
+        _, turns = _latest(stated, blocks)
+        turns[self._force[Group.SPINDLE][blocks] != 0] = np.nan
+        codes = self._given.words(key("M"))
+        switches = np.isin(codes.value, (3.0, 4.0, 5.0))
+        at = np.searchsorted(codes.block[switches], blocks, side="right") - 1
+        stands = (at >= 0) & (np.append(codes.value[switches], 0.0)[at] == 5.0)
+        return np.where((turns > 0) & ~stands, turns * (2 * np.pi / 60.0), np.nan)
 
 
 def _latest(column: WordColumn, blocks: Ints) -> tuple[Ints, Floats]:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints, shared
 from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses, rotation_from_abc
@@ -130,6 +130,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         rotation=found.taken("rotation"),
         axes=everywhere(np.full(6, np.nan), len(rows)),
         feed=found.taken("feed"),
+        spindle=shared(found.taken("spindle")),
         base=frame_of_base,
         tool=frame_of_tool,
         line=line,
@@ -295,6 +296,7 @@ def _columns(
         "kind": moves.kind,
         "place": place,
         "rotation": stand.rotation,
+        "spindle": np.where(given.modal.flow.reason[rows] != 0, np.nan, feeds.speeds(rows + given.start)),
         "feed": np.where(moves.kind == Kind.PTP, np.nan, feed),
         "centre": np.where(placed, moves.centre, np.nan),
         "normal": np.where(placed, moves.normal, np.nan),

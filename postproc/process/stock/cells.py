@@ -26,6 +26,7 @@ from postproc.process.stock.distance import (
     TIP_POINT,
     arc_of,
     axis_at,
+    cutter_distance,
     line_distance,
     swept_distance,
     tip_at,
@@ -36,6 +37,7 @@ CELL = 0.125  # radii of the smallest cutter
 MOST_CELLS = 4_000_000
 LARGEST_CELL, SMALLEST_CELL = 4e-3, 0.25e-3  # m
 _SAME = 1e-12  # m, and of unit vectors
+_RUN = 4.0  # radii: of the part of a line whose sweeps are listed together
 
 
 class Stock(NamedTuple):
@@ -43,8 +45,8 @@ class Stock(NamedTuple):
 
     blank: see ``Blank``; sweeps (M, ROW), cutters (T, 6): see ``distance``; grid (5,): size [m] of the cells, how far
     distances are known [m], and the numbers of cells from the blank's lowest corner; first (C + 1,) and near
-    (E,): the sweeps that come that near to each cell, ascending; head (E,): where in ``near`` the straight line starts
-    that each of them goes on, sweep after sweep.
+    (E,): the sweeps that come that near to each cell, ascending; stop (E,): the last of the sweeps from that of
+    ``near`` on that go on in one line and are near.
     """
 
     blank: Blank
@@ -53,7 +55,7 @@ class Stock(NamedTuple):
     grid: Floats
     first: Ints
     near: Ints
-    head: Ints
+    stop: Ints
 
 
 def build_stock(
@@ -80,15 +82,13 @@ def build_stock(
     count, covered = np.zeros(cells, np.int64), np.full(cells, np.iinfo(np.int32).max, np.int32)
     _mark_outside(stock, covered)
     live = np.full((len(sweeps), 2), [np.inf, -np.inf])
-    _list(stock, count, covered, live, none, False, slack)
+    joins = _go_on(sweeps)
+    _list(stock, joins, (count, none, none), covered, live, False, slack)
     first = np.zeros(cells + 1, np.int64)
     np.cumsum(count, out=first[1:])
-    near = np.zeros(max(int(first[-1]), 1), np.int32)
-    _list(stock, first[:-1].copy(), covered, live, near, True, slack)
-    head = np.zeros(len(near), np.int32)
-    joins = _go_on(sweeps) if slack == 0.0 else np.zeros(len(sweeps), bool)
-    _join(first, near, joins, head)
-    return stock._replace(first=first, near=near, head=head), live
+    near, stop = (np.zeros(max(int(first[-1]), 1), np.int32) for _ in range(2))
+    _list(stock, joins, (first[:-1].copy(), near, stop), covered, live, True, slack)
+    return stock._replace(first=first, near=near, stop=stop), live
 
 
 def _go_on(sweeps: Floats) -> Bools:
@@ -105,14 +105,6 @@ def _go_on(sweeps: Floats) -> Bools:
         & (np.einsum("mi,mi->m", step[1:], step[:-1]) > 0.0)
     )
     return joins & (sweeps[:, MODE] == ACROSS)
-
-
-@compiled
-def _join(first: Ints, near: Ints, joins: Bools, head: Ints) -> None:
-    for cell in range(len(first) - 1):
-        for place in range(first[cell], first[cell + 1]):
-            goes_on = place > first[cell] and near[place - 1] == near[place] - 1 and joins[near[place]]
-            head[place] = head[place - 1] if goes_on else place
 
 
 @compiled
@@ -155,21 +147,67 @@ def sweep_box(sweeps: Floats, cutters: Floats, j: int, box: Floats) -> None:
 
 
 @compiled
+def _widest(cutters: Floats, c: int, height: float, limit: float, outer: bool) -> float:
+    """[m] The largest distance from the axis at which a point at ``height`` [m] is within ``limit`` [m] of the cutter,
+    to 1e-9 m from above with ``outer``, else from below; -1 where there is none."""
+    low, high = 0.0, cutters[c, RADIUS] + limit
+    if high < 0.0 or cutter_distance(cutters, c, 0.0, height) > limit:
+        return -1.0
+    if cutter_distance(cutters, c, high, height) <= limit:
+        return high
+    while high - low > 1e-9:
+        middle = 0.5 * (low + high)
+        if cutter_distance(cutters, c, middle, height) <= limit:
+            low = middle
+        else:
+            high = middle
+    return high if outer else low
+
+
+@compiled
+def _run_end(sweeps: Floats, cutters: Floats, joins: Bools, s: int) -> int:
+    """The last sweep of the part of a line that starts with ``s``, some radii long."""
+    e, long, most = s, 0.0, _RUN * cutters[int(sweeps[s, CUTTER]), RADIUS]
+    while e + 1 < len(sweeps) and joins[e + 1] and long < most:
+        e += 1
+        long += np.sqrt(sweeps[e, STEP] ** 2 + sweeps[e, STEP + 1] ** 2 + sweeps[e, STEP + 2] ** 2)
+    return e
+
+
+@compiled
 def _list(
-    stock: Stock, count: Ints, covered: Ints, live: Floats, near: Ints, fill: bool, slack: float
+    stock: Stock,
+    joins: Bools,
+    lists: tuple[Ints, Ints, Ints],
+    covered: Ints,
+    live: Floats,
+    fill: bool,
+    slack: float,
 ) -> None:
-    """The sweeps near each cell counted, or with ``fill`` put into ``near`` from ``count`` on."""
+    """What is listed of each cell counted, or with ``fill`` put into its place.
+
+    lists: numbers (C,) of each cell, or where its own start, and the lists ``near`` and ``stop`` (E,).  The sweeps of a
+    line, of which each ``joins`` (M,) the one before it, are looked at together: which of them are near a cell, and
+    which covers it first, follows from where the cell is along the line.  With a ``slack`` each is listed for itself.
+    """
+    count, near, stop = lists
     sweeps, cutters, size = stock.sweeps, stock.cutters, stock.grid[0]
     low = stock.blank.frame[1:4]
     shape = stock.grid[2:].astype(np.int64)
     half = size * np.sqrt(0.75)
     limit = half + stock.grid[1] + slack
-    box = np.zeros((2, 3))
+    box, other = np.zeros((2, 3)), np.zeros((2, 3))
     first, last = np.zeros(3, np.int64), np.zeros(3, np.int64)
-    for s in range(len(sweeps)):
-        if fill and live[s, 0] > live[s, 1]:
-            continue
+    ends, way, layers = np.zeros(len(sweeps) + 1), np.zeros(3), np.zeros((2, shape[2]))
+    e = -1
+    while e + 1 < len(sweeps):
+        s = e + 1
+        e = _run_end(sweeps, cutters, joins, s)
         sweep_box(sweeps, cutters, s, box)
+        if e > s:
+            sweep_box(sweeps, cutters, e, other)
+            for k in range(3):
+                box[0, k], box[1, k] = min(box[0, k], other[0, k]), max(box[1, k], other[1, k])
         outside = False
         for k in range(3):
             below, above = (box[0, k] - limit - low[k]) / size, (box[1, k] + limit - low[k]) / size
@@ -177,8 +215,25 @@ def _list(
             first[k], last[k] = int(max(below, 0.0)), int(min(above, shape[k] - 1.0))
         if outside:
             continue
+        removes = sweeps[s, REMOVES] > 0.0
+        line = e > s
+        if line:  # where its sweeps end along it
+            way[:] = sweeps[e, TIP_POINT : TIP_POINT + 3] + sweeps[e, STEP : STEP + 3]
+            way -= sweeps[s, TIP_POINT : TIP_POINT + 3]
+            way /= np.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
+            for m in range(s, e + 1):
+                ends[m - s + 1] = ends[m - s] + (
+                    sweeps[m, STEP] * way[0] + sweeps[m, STEP + 1] * way[1] + sweeps[m, STEP + 2] * way[2]
+                )
         tip0, tip1 = tip_at(sweeps, s, 0.0), tip_at(sweeps, s, 1.0)
         axis0, axis1 = axis_at(sweeps, s, 0.0), axis_at(sweeps, s, 1.0)
+        c = int(sweeps[s, CUTTER])
+        upright = line and abs(axis0[2]) > 1.0 - 1e-15
+        if upright:  # then the height is that of the layer
+            for k in range(first[2], last[2] + 1):
+                h0 = (low[2] + (k + 0.5) * size - tip0[2]) * axis0[2]
+                layers[0, k] = _widest(cutters, c, h0, limit, True)
+                layers[1, k] = _widest(cutters, c, h0, -half - slack, False)
         for i in range(first[0], last[0] + 1):
             x = low[0] + (i + 0.5) * size
             for j in range(first[1], last[1] + 1):
@@ -188,23 +243,69 @@ def _list(
                     if covered[cell] < s:
                         continue
                     z = low[2] + (k + 0.5) * size
-                    d = swept_distance(sweeps, cutters, s, x, y, z, limit)
-                    if d > limit:
-                        continue
-                    if fill:
-                        if sweeps[s, REMOVES] > 0.0:
-                            near[count[cell]] = s
-                            count[cell] += 1
-                        continue
                     # near is enough: the list of a sweep that is close but does not touch must not stay empty
                     h0 = (x - tip0[0]) * axis0[0] + (y - tip0[1]) * axis0[1] + (z - tip0[2]) * axis0[2]
                     h1 = (x - tip1[0]) * axis1[0] + (y - tip1[1]) * axis1[1] + (z - tip1[2]) * axis1[2]
-                    live[s, 0] = min(live[s, 0], min(h0, h1) - half - slack)
-                    live[s, 1] = max(live[s, 1], max(h0, h1) + half + slack)
-                    if sweeps[s, REMOVES] > 0.0:
-                        count[cell] += 1
-                        if d <= -half - slack:
-                            covered[cell] = s
+                    near_first, near_last, covers = s, s, -1
+                    if line:
+                        outer = layers[0, k] if upright else _widest(cutters, c, h0, limit, True)
+                        if outer < 0.0:
+                            continue
+                        inner = layers[1, k] if upright else _widest(cutters, c, h0, -half - slack, False)
+                        ux = x - tip0[0] - h0 * axis0[0]
+                        uy = y - tip0[1] - h0 * axis0[1]
+                        uz = z - tip0[2] - h0 * axis0[2]
+                        along = ux * way[0] + uy * way[1] + uz * way[2]
+                        beside = ux * ux + uy * uy + uz * uz - along * along
+                        wide = outer * outer - beside
+                        if wide < 0.0:
+                            continue
+                        wide = np.sqrt(wide)
+                        if along + wide < 0.0 or along - wide > ends[e - s + 1]:
+                            continue
+                        near_first = s + _place_of(ends, e - s + 1, along - wide)
+                        near_last = s + _place_of(ends, e - s + 1, along + wide)
+                        if inner >= 0.0 and inner * inner >= beside:
+                            wide = np.sqrt(inner * inner - beside)
+                            if along + wide >= 0.0 and along - wide <= ends[e - s + 1]:
+                                covers = s + _place_of(ends, e - s + 1, along - wide)
+                    else:
+                        d = swept_distance(sweeps, cutters, s, x, y, z, limit)
+                        if d > limit:
+                            continue
+                        covers = s if d <= -half - slack else -1
+                    near_last = min(near_last, covered[cell])
+                    if covers >= 0 and removes:
+                        near_last = min(near_last, covers)
+                    if fill:
+                        for m in range(near_first, near_last + 1 if removes else near_first):
+                            if slack == 0.0 and m > near_first:
+                                break
+                            near[count[cell]] = m
+                            stop[count[cell]] = near_last if slack == 0.0 else m
+                            count[cell] += 1
+                        continue
+                    for m in range(near_first, near_last + 1):
+                        live[m, 0] = min(live[m, 0], min(h0, h1) - half - slack)
+                        live[m, 1] = max(live[m, 1], max(h0, h1) + half + slack)
+                    if removes:
+                        many = max(near_last + 1 - near_first, 0)
+                        count[cell] += many if slack > 0.0 else min(many, 1)
+                        if covers >= 0:
+                            covered[cell] = min(covers, covered[cell])
+
+
+@compiled
+def _place_of(ends: Floats, count: int, along: float) -> int:
+    """Which of ``count`` sweeps of a line that end at ``ends`` (count + 1,) [m] holds the place ``along`` [m]."""
+    low, high = 0, count - 1
+    while low < high:
+        middle = (low + high) // 2
+        if ends[middle + 1] < along:
+            low = middle + 1
+        else:
+            high = middle
+    return low
 
 
 @compiled
@@ -259,8 +360,7 @@ def _nearest(stock: Stock, x: float, y: float, z: float, time: int, depth: float
     place = low - 1
     while place >= start:
         # on the positive side only a smaller distance counts
-        head, last = int(stock.head[place]), int(stock.near[place])
-        first = int(stock.near[head])
+        first, last = int(stock.near[place]), min(int(stock.stop[place]), time - 1)
         if first == last:
             d = swept_distance(stock.sweeps, stock.cutters, last, x, y, z, max(best, depth))
         else:
@@ -269,5 +369,5 @@ def _nearest(stock: Stock, x: float, y: float, z: float, time: int, depth: float
             best, owner, end = d, first, last
             if best <= -reach:
                 return -reach, owner, end
-        place = head - 1
+        place -= 1
     return best, owner, end

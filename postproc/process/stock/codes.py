@@ -158,5 +158,21 @@ CODES = define(
             action="Correct the process file, or post the program for the tool that is used.",
             example="`1: {shape: flat, diameter: 16, ...}` for `(T1 D=10. CR=0. - ZMIN=-5. - flat end mill)`.",
         ),
+        "STK020": Code(
+            "info",
+            "spindle speed of the program",
+            meaning="The process file states no `spindle` for this tool, and the program states S.",
+            consequence="The feed per tooth, and with it the force, follows from the S that is in force.",
+            action="Compare it with the speed at the machine; an override changes the force.",
+            example="`S12000 M3` and a tool without `spindle`.",
+        ),
+        "STK021": Code(
+            "warning",
+            "spindle speed differs from the program's",
+            meaning="The process file states another speed of the spindle than the program.",
+            consequence="One of them is wrong: the feed per tooth, the forces and the correction may be.",
+            action="Correct `spindle` in the process file, or leave it out to use the S of the program.",
+            example="`spindle: 12000` for a program with `S10000 M3`.",
+        ),
     }
 )

@@ -134,7 +134,8 @@ def engage(
     order = np.argsort(sweep, kind="stable")
     sweep, weight, found = sweep[order], weight[order], found[order]
     hits = _hits(stock, sweeps, profiles, heading, live, earlier, radius)
-    cut = _by_motion(len(toolpath), sweeps, sweep, weight, found, laws, edges, hits, stock)
+    speed = speeds_of(sweeps, toolpath, edges)
+    cut = _by_motion(len(toolpath), sweeps, sweep, weight, found, laws, speed, hits, stock)
     return replace(cut, uneven=uneven)
 
 
@@ -151,17 +152,23 @@ def laws_of(sweeps: MotionSweeps, toolpath: Toolpath, edges: dict[int, Edges]) -
     """(M, 9) see ``find_contact``; the feed per tooth is NaN where anything that the force needs is not known."""
     laws = np.zeros((len(sweeps.rows), 9))
     laws[:, 0] = np.nan
+    speed = speeds_of(sweeps, toolpath, edges)
     for index, cutter in enumerate(sweeps.cutters):
         of = np.flatnonzero(sweeps.rows[:, CUTTER] == index)
         own = edges[cutter.number]
-        if not cutter.teeth or cutter.helix is None or own.speed is None or own.material is None:
+        if not cutter.teeth or cutter.helix is None or own.material is None:
             continue
-        per_tooth = 2 * np.pi / (own.speed * cutter.teeth)
-        laws[of, 0] = toolpath.feed[sweeps.motion[of]] * per_tooth
+        laws[of, 0] = toolpath.feed[sweeps.motion[of]] * (2 * np.pi / (speed[of] * cutter.teeth))
         known = own.material.coefficients
         laws[of, 1:] = [cutter.teeth, np.sign(cutter.helix), *known.cutting, *known.edge]
     laws[~(laws[:, 0] > 0), 0] = np.nan
     return laws
+
+
+def speeds_of(sweeps: MotionSweeps, toolpath: Toolpath, edges: dict[int, Edges]) -> Floats:
+    """(M,) [rad/s] the speed of the spindle: that of the process file, where it states none that of the program."""
+    stated = np.array([edges[cutter.number].speed or np.nan for cutter in sweeps.cutters])[sweeps.which]
+    return np.where(np.isnan(stated), toolpath.spindle[sweeps.motion], stated)
 
 
 def _uneven(sweep: Ints, rate: Floats) -> Ints:
@@ -236,7 +243,7 @@ def _highest_stock(stock: Stock, rows: Floats) -> Floats:
 
 def _by_motion(
     count: int, sweeps: MotionSweeps, sweep: Ints, weight: Floats, found: Floats, laws: Floats,
-    edges: dict[int, Edges], hits: dict[int, tuple[int, ...]], stock: Stock,
+    speed: Floats, hits: dict[int, tuple[int, ...]], stock: Stock,
 ) -> EngagedMotions:  # fmt: skip
     motion = sweeps.motion[sweep]
     touches = found[:, RATE] > LEAST_AREA
@@ -255,9 +262,8 @@ def _by_motion(
     table[rows] = np.where(touches[best, None], found[best], 0.0)
     largest = np.zeros((count, 6))
     largest[rows] = wrench[best]
-    speed = np.zeros(count)
-    numbers = np.array([edges[c.number].speed or np.nan for c in sweeps.cutters])
-    speed[sweeps.motion] = numbers[sweeps.rows[:, CUTTER].astype(int)]
+    turning = np.zeros(count)
+    turning[sweeps.motion] = speed
     cuts = volume > 0
     return EngagedMotions(
         cuts=cuts,
@@ -270,7 +276,7 @@ def _by_motion(
         entry=table[:, ENTRY],
         exit=table[:, EXIT],
         chip=np.where(np.isnan(mean[:, 0]), np.nan, table[:, CHIP]),
-        power=np.where(cuts, mean[:, 5] * speed, 0.0),
+        power=np.where(cuts, mean[:, 5] * turning, 0.0),
         hits=hits,
         stock=stock,
         uneven=np.zeros(0, np.int64),

@@ -43,7 +43,7 @@ class MotionSweeps:
     """rows (M, ROW): see ``distance``; motion (M,): row of the toolpath; share (M, 2): of that motion; length (M,)
     [m] of the path of the tip; heading (M, 3): direction of the feed across the spindle, the last where there is
     none; cutters: in the order of CUTTER; simulated (N,): motions that are known from their start; in_stock
-    (N, 3, 3): rotation of the programmed base to the stock."""
+    (N, 3, 3): rotation of the programmed base to the stock; stock: its axes in the robot base."""
 
     rows: Floats
     motion: Ints
@@ -53,6 +53,7 @@ class MotionSweeps:
     cutters: tuple[Cutter, ...]
     simulated: Bools
     in_stock: Floats
+    stock: Poses
 
     @property
     def which(self) -> Ints:
@@ -65,7 +66,9 @@ def find_sweeps(
 ) -> MotionSweeps:
     """The sweeps of a program.  low, high (3,) [m]: the box around the blank, beside which nothing is divided.  Refusal
     STK006: a tool that cuts is not stated; STK007: nothing can be simulated; STK010: the base of the stock."""
-    pose, turned = _in_stock(toolpath, frames, process, program)
+    stock = _stock_in_robot(toolpath, frames, process, program)
+    pose = stock.inverse() @ frames.base_in_robot
+    turned = np.broadcast_to(pose.rotation, (len(toolpath), 3, 3))
     axis = -np.einsum("nij,nj->ni", turned @ toolpath.rotation, frames.spindle_in_tool)
     tip = np.einsum("nij,nj->ni", turned, toolpath.position) + pose.position
     on_path = np.isin(toolpath.kind, (Kind.LIN, Kind.CIRC, Kind.SPL))
@@ -123,14 +126,20 @@ def find_sweeps(
     rows[:, REMOVES] = cuts[owner]
     flat = rows[:, STEP : STEP + 3] - along[:, None] * axes[0]
     return MotionSweeps(
-        rows, row[owner], share, _lengths(rows), _headings(flat, axes[0]), tuple(cutters), simulated, turned
+        rows,
+        row[owner],
+        share,
+        _lengths(rows),
+        _headings(flat, axes[0]),
+        tuple(cutters),
+        simulated,
+        turned,
+        stock,
     )
 
 
-def _in_stock(
-    toolpath: Toolpath, frames: MotionFrames, process: StockProcess, program: str
-) -> tuple[Poses, Floats]:
-    """The programmed base of each motion in that of the stock (N), and its rotation (N, 3, 3)."""
+def _stock_in_robot(toolpath: Toolpath, frames: MotionFrames, process: StockProcess, program: str) -> Poses:
+    """The axes of the stock in the robot base: the base that the process file names, or that of the first cut (1)."""
     usable = toolpath.known & np.isfinite(frames.base_in_robot.position[:, 0])
     if process.base is not None:
         numbers = np.array(
@@ -144,8 +153,7 @@ def _in_stock(
         raise Refusal(Finding("STK007", "no motion has a known target and base", program))
     on_path = usable & np.isin(toolpath.kind, (Kind.LIN, Kind.CIRC, Kind.SPL))
     first = int(np.argmax(on_path if on_path.any() else usable))
-    pose = frames.base_in_robot[first : first + 1].inverse() @ frames.base_in_robot
-    return pose, np.broadcast_to(pose.rotation, (len(toolpath), 3, 3))
+    return frames.base_in_robot[first : first + 1]
 
 
 def _cutters(

@@ -27,6 +27,7 @@ from postproc.toolpath import Kind, Toolpath
 _PARTS = {CUTTING: "the cutter", SHANK: "the shank", HOLDER: "the holder"}
 _MOST_FINDINGS = 20
 _NO_MOVE = 1e-7  # m
+_SAME_SPEED = 0.001
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +75,7 @@ def simulate(path: Path, toolpath: Toolpath, frames: MotionFrames, program: str)
         *_not_simulated(sweeps, toolpath, program),
         *_lengths(sweeps, process),
         *_commented(sweeps, commented, program),
+        *_speeds(sweeps, engagement.cuts, process, toolpath, program),
     ]
     return StockRun(process, toolpath, blank, before, sweeps, engagement, ci95, tuple(findings))
 
@@ -166,10 +168,11 @@ def unknown_forces(run: StockRun, toolpath: Toolpath, program: str, code: str) -
         if not len(rows):
             continue
         own = run.process.edges[cutter.number]
+        turns = own.speed is not None or not np.isnan(toolpath.spindle[rows]).any()
         stated = {
             "teeth": cutter.teeth,
             "helix": cutter.helix,
-            "spindle": own.speed,
+            "spindle (or S in the program)": turns or None,
             "material": own.material,
         }
         missing = [name for name, value in stated.items() if value is None] or ["feed in the program"]
@@ -263,6 +266,36 @@ def _commented(sweeps: MotionSweeps, commented: Mapping[int, CommentedTool], pro
                 f" diameter {2 * cutter.radius / MM:g} mm, which is used"
             )
             findings.append(Finding("STK019", message, program, tool.line))
+    return findings
+
+
+def _speeds(
+    sweeps: MotionSweeps, cuts: Bools, process: StockProcess, toolpath: Toolpath, program: str
+) -> list[Finding]:
+    """Which speeds of the spindle are those of the program, and where the process file states others."""
+    findings = []
+    for index, cutter in enumerate(sweeps.cutters):
+        rows = np.unique(sweeps.motion[sweeps.which == index])
+        rows = rows[cuts[rows] & ~np.isnan(toolpath.spindle[rows])]
+        stated = process.edges[cutter.number].speed
+        if stated is not None:
+            rows = rows[np.abs(toolpath.spindle[rows] - stated) > _SAME_SPEED * stated]
+        if not len(rows):
+            continue
+        turns = np.unique(np.round(toolpath.spindle[rows] * 30 / np.pi, 3))
+        words = f"{turns[0]:g}" if len(turns) == 1 else f"{turns[0]:g} to {turns[-1]:g}"
+        line = int(toolpath.line[rows[0]])
+        if stated is None:
+            message = (
+                f"tool {cutter.number} turns at {words} 1/min in {len(rows)} motions, by the S of the program"
+            )
+            findings.append(Finding("STK020", message, program, line))
+        else:
+            message = (
+                f"tool {cutter.number} cuts {len(rows)} motions at S {words}; the process file states spindle"
+                f" {stated * 30 / np.pi:g} 1/min, which is used"
+            )
+            findings.append(Finding("STK021", message, program, line))
     return findings
 
 
