@@ -22,6 +22,7 @@ NUMBERS = 7
 """Of a target that can be corrected: x, y, z and q1 to q4."""
 NOWHERE = ((-1, -1),) * NUMBERS
 _LIST = re.compile(rb"\[[^\[\]]*+\]")
+_COMMENT = re.compile(rb"(\"[^\"\r\n]*+\")|![^\r\n]*+")
 _EDITABLE = re.compile(rb"[-+]?[ \t]*[0-9.]")
 
 
@@ -150,6 +151,11 @@ class RapidSourceMap:
         return found
 
 
+def in_one_line(text: bytes) -> bytes:
+    """A part of a statement without its comments and line ends."""
+    return b" ".join(_COMMENT.sub(rb"\1", text).split())
+
+
 def target_numbers(value: Value) -> list[float]:
     """x, y, z, q1..q4 of a robtarget; NaN where one is not known."""
     return [number for number, _, _ in _leaves(value)]
@@ -204,7 +210,7 @@ def _words(expression: Any, value: Value, raw: bytes) -> bytes:
     """Configuration and external axes: as the aggregate has them, or as numbers."""
     if isinstance(expression, Aggregate) and len(expression.items) == 4:
         parts = expression.items[2:]
-        return b",".join(b" ".join(raw[part.start : part.stop].split()) for part in parts)
+        return b",".join(in_one_line(raw[part.start : part.stop]) for part in parts)
     conf, external = numbers_of(item_of(value, 2), 4), numbers_of(item_of(value, 3), 6)
     if conf is None or external is None:
         return b""
