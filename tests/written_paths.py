@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -32,7 +33,7 @@ bases:
   2: {x: 1500, y: -60, z: 640, a: 8, b: -3, c: 2}
 start: [0, -90, 90, 0, 45, 0]
 symbols: {tool1: 1, tool2: 2, part1: 1, part2: 2}
-tolerance: 0.02
+tolerance: 0.05  # few motions are divided: how an inserted point is rounded is of each language
 max_growth: 6
 """
 SYMBOLS = {"TOOL1": 1.0, "TOOL2": 2.0, "PART1": 1.0, "PART2": 2.0}
@@ -245,13 +246,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--paths", type=int, default=200)
     asked = parser.parse_args()
-    most, angle, poses = 0.0, 0.0, 0
+    most, angle, poses, other = 0.0, 0.0, 0, 0
     with tempfile.TemporaryDirectory() as name:
         for seed in range(asked.paths):
-            off, turned, count = differences(Path(name) / str(seed), seed)
+            try:
+                off, turned, count = differences(Path(name) / str(seed), seed)
+            except AssertionError as error:
+                other += 1
+                print(f"path {seed}: {error}")
+                continue
             most, angle, poses = max(most, off), max(angle, turned), poses + count
     print(f"{asked.paths} paths in {', '.join(WRITERS)}: {poses} corrected poses compared")
-    print(f"largest difference {most:.5f} mm, {angle:.5f} deg")
+    print(f"largest difference {most:.5f} mm, {angle:.5f} deg; {other} paths not corrected alike")
+    sys.exit(1 if other or most > WITHIN_MM or angle > WITHIN_DEG else 0)
 
 
 if __name__ == "__main__":

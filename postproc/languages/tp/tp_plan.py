@@ -17,6 +17,9 @@ from postproc.languages.tp.position_data import CARTESIAN, EXTERNAL, TpPosition
 from postproc.languages.tp.tp_source_map import TpSourceMap
 from postproc.languages.tp.tp_statements import TpMove
 
+MOST_POINTS = 10**8
+"""Numbers of points from here on are left out where the next free one is looked for: more digits are not read."""
+
 
 class SixNumbers(NamedTuple):
     """X, Y, Z [mm], W, P, R [deg]: what the text says, what is wanted, and the decimals of each."""
@@ -90,12 +93,13 @@ class TpPlanNumbers(PlanRows):
 
 
 class NewPoints:
-    """Points that are added to /POS, with numbers above those that the file has or names."""
+    """Points that are added to /POS, with numbers above those that the file has or names, unless these are absurd."""
 
     def __init__(self, task: TpPlanNumbers) -> None:
         self.task = task
         places = task.places
-        self.next = max([0, *places.positions, *places.uses, *places.read]) + 1
+        known = (*places.positions, *places.uses, *places.read)
+        self.next = max((number for number in known if number < MOST_POINTS), default=0) + 1
         self.texts: list[bytes] = []
 
     def add(self, source: TpPosition, literals: Mapping[bytes, bytes], named: bool = False) -> int:
