@@ -27,7 +27,7 @@ def read(documents: tuple[Document, ...], settings: ReadingSettings, fast: bool 
     """
     document = documents[0]
     module = ModuleParser(document.raw, fast).file()
-    flow = Propagation(module)
+    flow = Propagation(module, document.raw)
     findings: list[Finding] = []
     try:
         flow.run()

@@ -68,7 +68,7 @@ class Propagation:
     of its first call; ``reads``: where the place of the robot is read -> the motions after which; ``unread``:
     statements that are not understood."""
 
-    def __init__(self, module: Module) -> None:
+    def __init__(self, module: Module, raw: bytes) -> None:
         self.module = module
         self.routines: dict[bytes, RapidRoutine] = {}
         self.ambiguous: set[bytes] = set()
@@ -77,7 +77,7 @@ class Propagation:
                 self.ambiguous.add(routine.name)
             self.routines[routine.name] = routine
         functions = frozenset(r.name for r in module.routines if r.kind == b"FUNC")
-        self.data = DeclaredData(module, functions)
+        self.data = DeclaredData(module, functions, raw)
         self.usage = Usage(module)
         self.facts: dict[int, MotionFact] = {}
         self.passed: dict[int, tuple[Remark, int]] = {}
@@ -423,7 +423,7 @@ class Propagation:
 
     def _type(self, name: bytes, key: bytes) -> bytes:
         if key == name:
-            return self.data.types.get(name, b"")
+            return self.data.type_of(name)
         return b"NUM" if b" " in name else self._own(self._active[-1])[name][1]
 
     def _evaluator(self, state: ProgramState) -> Evaluator:
