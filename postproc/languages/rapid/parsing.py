@@ -267,6 +267,20 @@ class ModuleParser(RapidExpressionParser):
 
     def _simple(self, start: int) -> Statement:
         """An assignment, a label, or an instruction."""
+        if self.sign(b"%"):  # the name of the procedure is computed
+            self.expression()
+            self.need(b"%")
+            name_stop = self.tokens.before
+            arguments = self.arguments(b";")
+            self.need(b";")
+            return Instruction(self.raw[start:name_stop], arguments, start, self.tokens.before)
+        if self._word() == b"CONNECT":
+            self.take()
+            self.expression()
+            self.word(b"WITH")
+            self.name()
+            self.need(b";")
+            return Instruction(b"CONNECT", (), start, self.tokens.before)
         if self.next.kind != NAME or self.next.text in _RESERVED:
             raise SyntaxProblem
         name = self.take()

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from postproc.languages.rapid.declared_data import DeclaredData, Usage, first_value, names_in, walk
-from postproc.languages.rapid.evaluation import Evaluator, Typed
+from postproc.languages.rapid.evaluation import Evaluator, Typed, is_component, unknown_record
 from postproc.languages.rapid.flow_graph import FlowGraph, Step
 from postproc.languages.rapid.instructions import (
     DISPLACING,
@@ -288,6 +288,8 @@ class Propagation:
         if self._runner.recording:
             self.calls.setdefault(step.name, step.start)
         self._change(step.arguments, state)
+        if step.name.startswith(b"%"):  # any procedure, those of this file among them
+            self._forget_all(self.usage.assigned, state)
         if moves:
             state.last = frozenset([ELSEWHERE])
 
@@ -379,7 +381,9 @@ class Propagation:
         key, shown = self._key(variable), variable.decode("latin-1")
         if key == variable and (variable not in self.data or self.data.is_constant(variable)):
             return
-        old, _ = self._look(state)(variable)
+        old, kind = self._look(state)(variable)
+        if isinstance(old, UnknownData) and is_component(target):
+            old = unknown_record(kind, self._evaluator(state).components, old)
         new = value
         if isinstance(value, UnknownData) and NOT_CONSTANT not in value.reason:
             new = UnknownData(f"{shown}{NOT_CONSTANT}{value.reason}")

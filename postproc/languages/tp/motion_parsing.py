@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from postproc.languages.tp.tp_statements import Operand, PointReference, RegisterOperand, TpMove
 
 _BLANK = re.compile(rb"[ \t]*+")
-_START = re.compile(rb"[ \t]*+([JLCAS])(?=[ \t]*+(?:P|PR|AR|R)[ \t]*+\[)", re.I)
+_START = re.compile(rb"[ \t]*+(?![AS]R[ \t]*+\[)([JLCAS])(?=[ \t]*+(?:P|PR|AR|R)[ \t]*+\[)", re.I)
 _POINT = re.compile(rb"[ \t]*+P[ \t]*+\[[ \t]*+([0-9]{1,9}+)[ \t]*+(?::[^\]]*+)?+\]", re.I)
 _OTHER_POINT = re.compile(rb"[ \t]*+(PR|P|AR|R)[ \t]*+\[(?:[^\[\]]*+(?:\[[^\[\]]*+\])?+)*+\]", re.I)
 _UNIT = rb"((?:mm/sec|cm/min|inch/min|deg/sec|msec|sec|%)(?![A-Z0-9_.%/]))"
