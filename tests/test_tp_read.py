@@ -14,6 +14,7 @@ from case_files import TP_CASES, refusals
 from postproc.base.units import MM
 from postproc.languages import detect
 from postproc.languages.dialect import Program, ReadingSettings
+from postproc.languages.tp.position_data import COMMON_POINT, read_positions
 from postproc.toolpath.initial_state import InitialState
 
 CASES = TP_CASES
@@ -53,6 +54,19 @@ VARIANTS = {
 def test_spelling_does_not_matter(path: Path, name: str) -> None:
     raw = path.read_bytes()
     assert list(read(VARIANTS[name](raw)).toolpath.dump()) == list(read(raw).toolpath.dump())
+
+
+@pytest.mark.parametrize("path", [*CASES.good, *CASES.bad], ids=lambda path: path.stem)
+def test_points_are_taken_as_the_general_rules_take_them(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    raw = path.read_bytes()
+    quick = read_positions(raw, 0, len(raw))
+    monkeypatch.setattr("postproc.languages.tp.position_data.COMMON_POINT", re.compile(rb"(?!)"))
+    assert read_positions(raw, 0, len(raw)) == quick
+
+
+def test_common_points_are_taken_at_once() -> None:
+    text = POINT.format(n=1, x=10.0).encode()
+    assert COMMON_POINT.match(text, text.index(b"{") + 1) is not None
 
 
 APPENDED = (" foo", ",foo", "+1", "[1]", " @", " 5", "Offset", " FINE", ":", "J")

@@ -28,6 +28,15 @@ _FLAGS = re.compile(
 CARTESIAN = (b"X", b"Y", b"Z", b"W", b"P", b"R")
 JOINTS = tuple(b"J%d" % axis for axis in range(1, 7))
 EXTERNAL = tuple(b"E%d" % axis for axis in range(1, 7))
+COMMON_POINT = re.compile(
+    rb"\s*+GP1:\s*+UF : ([0-9]{1,9}+), UT : ([0-9]{1,9}+),\s*+CONFIG : ('[^'\r\n]*+'),\s*+"
+    + rb",\s*+".join(
+        name + rb"[ \t]*+=[ \t]*+(" + _NUMBER + rb")[ \t]*+" + unit
+        for name, unit in zip(CARTESIAN, (b"mm",) * 3 + (b"deg",) * 3, strict=True)
+    )
+    + rb"\s*+\}\s*+;"
+)
+"""The braces of a point as controllers and posts write them, taken at once; the general rules give the same."""
 _UNITS = {
     **dict.fromkeys(CARTESIAN[:3], b"mm"),
     **dict.fromkeys(CARTESIAN[3:], b"deg"),
@@ -112,6 +121,11 @@ def _position(raw: bytes, head: re.Match[bytes], stop: int) -> TpPosition:
     comment = head.span(2) if head[2] is not None else (head.end(1), head.end(1))
     one = TpPosition(int(head[1]), start, head.end(), head.span(1), comment)
     at = head.end()
+    common = COMMON_POINT.match(raw, at, stop)
+    if common is not None:
+        one.stop = common.end()
+        one.groups.append(_common_group(common))
+        return one
     while True:
         end = _END.match(raw, at, stop)
         if end is not None:
@@ -129,6 +143,17 @@ def _position(raw: bytes, head: re.Match[bytes], stop: int) -> TpPosition:
             return one
         comma = _COMMA.match(raw, after, stop)
         at = after if comma is None else comma.end()
+
+
+def _common_group(found: re.Match[bytes]) -> PositionGroup:
+    values = [float(text) for text in found.group(4, 5, 6, 7, 8, 9)]
+    return PositionGroup(
+        1,
+        {b"UF": int(found[1]), b"UT": int(found[2])},
+        found[3][1:-1],
+        dict(zip(CARTESIAN, values, strict=True)),
+        {name: found.span(place) for place, name in enumerate(CARTESIAN, 4)},
+    )
 
 
 def _item(raw: bytes, at: int, stop: int, one: TpPosition) -> int:
