@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from postproc.languages.core.row_facts import SPEAKS
 from postproc.languages.rapid.declared_data import DeclaredData, Usage, first_value, names_in, walk
 from postproc.languages.rapid.evaluation import Evaluator, Typed, is_component, unknown_record
 from postproc.languages.rapid.flow_graph import FlowGraph, Step
@@ -46,6 +47,7 @@ from postproc.toolpath import ArcFrame, Kind, OrientationMode
 
 OTHER = MotionForm(Kind.OTHER)
 _SETTINGS = frozenset([b"TOOLDATA", b"WOBJDATA", b"SPEEDDATA", b"ZONEDATA"])
+_MODES = DISPLACING | {b"CONFL", b"CONFJ", b"SINGAREA", b"CIRPATHMODE", b"VELSET"}
 MOST_STEPS = 4_000_000
 """Statements that are followed; each statement of a file counts for four more."""
 NOT_CONSTANT = " is not constant: "
@@ -56,6 +58,15 @@ DEEPEST = 12
 def _length(statement: object) -> int:
     """The statements that a statement counts for."""
     return len(statement) if isinstance(statement, PlainMotions) else 1
+
+
+def _sets_modes(routine: RapidRoutine) -> bool:
+    """Whether a routine changes how motions after it are meant."""
+    return any(
+        one.name in _MODES if isinstance(one, Instruction) else SPEAKS.match(one.text)
+        for one in walk(routine.body)
+        if isinstance(one, Instruction | Remark)
+    )
 
 
 class TooLong(Exception):
@@ -290,6 +301,8 @@ class Propagation:
         self._change(step.arguments, state)
         if step.name.startswith(b"%"):  # any procedure, those of this file among them
             self._forget_all(self.usage.assigned, state)
+            if any(_sets_modes(one) for one in self.module.routines if one not in self._active):
+                state.displaced |= {b"a procedure whose name is computed"}
         if moves:
             state.last = frozenset([ELSEWHERE])
 
