@@ -56,19 +56,22 @@ class Drawing:
 
     def __init__(self, seed: int) -> None:
         self.random = Random(seed)
+        self.declared: list[str] = []
 
     def program(self) -> bytes:
         lines = ["PROC main()", *self.block(), "ENDPROC", "PROC sub()", *self.block(1)]
         lines += ["ERROR", *self.block(1), "ENDPROC", "ENDMODULE", ""]
         newline = self.random.choice(["\n", "\r\n"])
-        return (HEAD + "\n".join(lines)).replace("\n", newline).encode()
+        if self.random.random() < 0.1:
+            self.random.shuffle(self.declared)
+        return (HEAD + "".join(self.declared) + "\n".join(lines)).replace("\n", newline).encode()
 
     def block(self, depth: int = 0) -> list[str]:
         lines: list[str] = []
         for _ in range(self.random.randint(1, 3)):
             kind = self.random.randint(0, 7)
             if kind < 4 or depth > 1:
-                lines += self.run()
+                lines += self.run() if self.random.random() < 0.6 else self.named()
             elif kind < 6:
                 lines.append(self.random.choice(STATEMENTS))
             else:
@@ -81,6 +84,32 @@ class Drawing:
         word, tail = self.random.choice(["MoveL", "MoveL", "MOVEJ", "moveL"]), self.random.choice(TAILS)
         exotic, indent = self.random.randint(-3, count), self.random.choice(["", "  ", "\t"])
         return [f"{indent}{word} {self.target(place == exotic)}{tail}" for place in range(count)]
+
+    def named(self) -> list[str]:
+        """Declarations, and motions to them; some of them are there again otherwise."""
+        count = self.random.randint(FEWEST - 2, 2 * FEWEST)
+        first, exotic = len(self.declared) + 10, self.random.randint(-6, count)
+        kind = self.random.choice(
+            ["CONST robtarget", "LOCAL CONST robtarget", "pers RobTarget", "VAR robtarget"]
+        )
+        names = [f"t{number}" for number in range(first, first + count)]
+        self.declared += [
+            f"{kind} {name}:={self.target(place == exotic).strip()};\n" for place, name in enumerate(names)
+        ]
+        word, tail = self.random.choice(["MoveL", "MoveJ", "moveL"]), self.random.choice(TAILS)
+        lines = [f"{word} {name}{tail}" for name in names]
+        if self.random.random() < 0.3:
+            self.random.shuffle(lines)
+        one = self.random.choice(names)
+        more = [
+            f"! {one.upper()}", f"MoveL {one},v50,z1,t;", f"MoveL Offs({one},1,0,0),v50,z1,t;", f"x:={one}.trans.x;",
+            f"VAR robtarget {one};", f"{one}.trans.x:=3;", f"TPWrite \"{one}\";", f"sub2 {one};", f"{one}x:=1;",
+        ]  # fmt: skip
+        if self.random.random() < 0.5:
+            lines.insert(self.random.randint(0, len(lines)), self.random.choice(more))
+        if self.random.random() < 0.2:
+            self.declared.append(self.declared[-1])
+        return lines
 
     def number(self) -> str:
         """One of several spellings of a number, and of one beside it."""
@@ -226,6 +255,22 @@ def program(body: list[str]) -> bytes:
 )
 def test_which_lines_are_read_together(body: list[str], together: int) -> None:
     assert compare(program(body), 1) == together
+
+
+def test_named_targets_that_nothing_else_names_are_read_together() -> None:
+    names = [f"CONST robtarget q{n}:={line[6:].partition(',v50')[0]};" for n, line in enumerate(lines(20))]
+    moves = [f"MoveL q{n},v50,z1,t\\WObj:=w;" for n in range(20)]
+
+    def together(body: list[str]) -> int:
+        text = HEAD + "\n".join([*names, "PROC main()", *body, "ENDPROC", "ENDMODULE", ""])
+        return compare(text.encode(), 1)
+
+    assert together(moves) == 20
+    assert together(moves[::-1]) == 20
+    assert together([*moves[:10], "! FORCE 1 2 3", *moves[10:]]) == 20
+    for other in ("MoveL Offs(q9,0,0,1),v50,z1,t;", "! q9", "q9:=p1;", "MoveJ Q9,v50,z1,t;"):
+        assert together([*moves, other]) == 9 + 10
+    assert together([*moves, "VAR robtarget q15;"]) == 15
 
 
 @pytest.mark.slow

@@ -9,71 +9,26 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from case_files import RAPID_CASES, refusals
 
-from postproc.base.document import Document
-from postproc.base.findings import CODES
 from postproc.base.geometry import rotation_from_abc
 from postproc.base.units import DEG, MM
-from postproc.languages import DIALECTS, detect
-from postproc.languages.dialect import Program, ReadingSettings, WritingSettings
+from postproc.languages import detect
+from postproc.languages.dialect import Program, ReadingSettings
 from postproc.languages.rapid.parsing import ModuleParser
 from postproc.languages.rapid.quaternions import quaternion_from_rotation, rotation_from_quaternion
-from postproc.toolpath import Plan
 
-RAPID = DIALECTS["rapid"]
-WRITING = WritingSettings(mm=3, deg=3)
-CASES = Path(__file__).parent / "programs" / "rapid"
-GOOD = sorted(CASES.glob("*.mod"))
-BAD = sorted((CASES / "bad").glob("*.mod"))
-WRITTEN = {"RAP015", "RAP017"}
-"""Codes that only a writer gives, or a program that is too long for a case."""
+CASES = RAPID_CASES
+RAPID = CASES.dialect
 TARGET = "[[1,2,3],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
 
 
-def read(raw: bytes | str, settings: ReadingSettings | None = None) -> Program:
-    raw = raw if isinstance(raw, bytes) else raw.encode("latin-1")
-    return RAPID.read((Document(Path("part.mod"), raw),), settings or ReadingSettings())
+read, codes = CASES.read, refusals
 
 
 def body(text: str, data: str = "") -> Program:
     tool = "PERS tooldata t:=[TRUE,[[0,0,200],[1,0,0,0]],[5,[0,0,80],[1,0,0,0],0,0,0]];\n"
     return read(f"MODULE part\n{tool}{data}PROC main()\n{text}ENDPROC\nENDMODULE\n")
-
-
-def codes(program: Program) -> dict[int, str]:
-    return {row: finding.code for row, finding in program.toolpath.constraints.refused.items()}
-
-
-@pytest.mark.parametrize("path", GOOD, ids=lambda path: path.stem)
-def test_a_case_reads_as_its_dump(path: Path) -> None:
-    assert list(read(path.read_bytes()).toolpath.dump()) == path.with_suffix(".dump").read_text().splitlines()
-
-
-@pytest.mark.parametrize("path", BAD, ids=lambda path: path.stem)
-def test_a_bad_case_gives_the_codes_of_its_first_line(path: Path) -> None:
-    program = RAPID.read((Document(path, path.read_bytes()),))
-    expected = path.read_text("latin-1").splitlines()[0].removeprefix("! ").split()
-    assert sorted({finding.code for finding in program.findings}) == expected
-    for finding in program.findings:
-        assert finding.file == str(path)
-        assert finding.line > 0
-        assert finding.help or CODES[finding.code].explanation
-
-
-def test_every_code_has_a_case() -> None:
-    shown = {code for path in BAD for code in path.read_text("latin-1").splitlines()[0][2:].split()}
-    assert {code for code in CODES if code.startswith("RAP")} - WRITTEN <= shown
-    assert len(GOOD) + len(BAD) >= 60
-
-
-@pytest.mark.parametrize("path", [*GOOD, *BAD], ids=lambda path: path.stem)
-def test_every_case_is_claimed_and_stays_as_it_is(path: Path) -> None:
-    raw = path.read_bytes()
-    assert detect(path, raw) is RAPID
-    program = read(raw)
-    edits = RAPID.edit_targets(program, Plan.of(program.toolpath), WRITING)
-    assert not len(edits.edits)
-    assert not edits.unwritten
 
 
 VARIANTS = {
@@ -89,7 +44,7 @@ VARIANTS = {
 
 
 @pytest.mark.parametrize("name", VARIANTS)
-@pytest.mark.parametrize("path", GOOD, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", CASES.good, ids=lambda path: path.stem)
 def test_spelling_does_not_matter(path: Path, name: str) -> None:
     raw = path.read_bytes()
     if name == "tabs" and b"%%%" in raw:
@@ -98,7 +53,7 @@ def test_spelling_does_not_matter(path: Path, name: str) -> None:
     assert varied == list(read(raw).toolpath.dump())
 
 
-@pytest.mark.parametrize("path", [*GOOD, *BAD], ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", [*CASES.good, *CASES.bad], ids=lambda path: path.stem)
 def test_lists_of_numbers_are_taken_as_the_general_rules_take_them(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -131,13 +86,13 @@ def test_a_word_more_is_another_reading_or_a_finding(statement: str, word: str) 
 
 
 def test_zones_and_stops() -> None:
-    path = read((CASES / "zones.mod").read_bytes()).toolpath
+    path = read((CASES.folder / "zones.mod").read_bytes()).toolpath
     assert path.approximation / MM == pytest.approx([0, 0.3, 200, 3, 4, 0, 0, np.nan], nan_ok=True)
     assert path.stops.tolist() == [True, False, False, False, False, True, True, False]
 
 
 def test_forces_are_those_of_the_comments_that_were_passed_last() -> None:
-    path = read((CASES / "remarks.mod").read_bytes()).toolpath
+    path = read((CASES.folder / "remarks.mod").read_bytes()).toolpath
     assert [(note.row, note.text) for note in path.annotations] == [
         (0, "FORCE 0 100 50 @feed"), (1, "force off"), (2, "COMPENSATE OFF"),
     ]  # fmt: skip
@@ -145,17 +100,17 @@ def test_forces_are_those_of_the_comments_that_were_passed_last() -> None:
 
 
 def test_the_place_of_a_motion_in_the_flow() -> None:
-    path = read((CASES / "jumps.mod").read_bytes()).toolpath
+    path = read((CASES.folder / "jumps.mod").read_bytes()).toolpath
     assert path.continues.tolist()[:3] == [False, False, False]
     assert dict(path.predecessors) == {0: (-1, 1), 1: (0,), 2: (0,)}
-    straight = read((CASES / "arrays.mod").read_bytes()).toolpath
+    straight = read((CASES.folder / "arrays.mod").read_bytes()).toolpath
     assert straight.continues.all()
 
 
 def test_what_is_inserted_before() -> None:
-    forms = read((CASES / "forms.mod").read_bytes()).toolpath
+    forms = read((CASES.folder / "forms.mod").read_bytes()).toolpath
     assert sorted(forms.constraints.no_insert_before) == [0, 2, 3, 5]
-    lines = read((CASES / "several_lines.mod").read_bytes()).toolpath
+    lines = read((CASES.folder / "several_lines.mod").read_bytes()).toolpath
     assert sorted(lines.constraints.no_insert_before) == [0, 1, 2]
 
 
@@ -228,12 +183,12 @@ def test_quaternions_and_rotations(seed: int) -> None:
 
 def test_programs_in_other_languages_are_not_claimed() -> None:
     for name in ("krl/arcs.src", "fanuc/program.nc"):
-        path = CASES.parent / name
+        path = CASES.folder.parent / name
         assert detect(path, path.read_bytes()) is not RAPID
 
 
 def test_the_sample_can_be_made_again_and_is_understood() -> None:
-    folder = CASES.parents[2] / "samples" / "irb6700_pocket"
+    folder = CASES.folder.parents[2] / "samples" / "irb6700_pocket"
     made = subprocess.run([sys.executable, folder / "make_pocket.py"], check=True, capture_output=True)
     raw = (folder / "pocket.mod").read_bytes()
     assert made.stdout.splitlines() == raw.splitlines()

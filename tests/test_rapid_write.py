@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drawn_plans import divided, refuse_what_may_not_move
 
 from postproc.base.document import Document, Edit, Edits, Span, apply
 from postproc.base.findings import Refusal
@@ -18,7 +19,7 @@ from postproc.languages.permitted import refuse_other
 from postproc.languages.rapid.quaternions import quaternion_from_rotation
 from postproc.robot.axis_track import follow_axes, nominal_flange
 from postproc.robot.description import find_robot, load_robot
-from postproc.toolpath import Kind, Plan, Role
+from postproc.toolpath import Plan, Role
 
 RAPID, KRL = DIALECTS["rapid"], DIALECTS["krl"]
 WRITING = WritingSettings(mm=3, deg=3)
@@ -132,34 +133,6 @@ def test_a_point_in_a_statement_of_several_lines_is_not_replaced() -> None:
     assert list(edited(program, plan_of(program, {0: (1, 0, 0)})).unwritten) == [0]
 
 
-def divided(program: Program, row: int, role: Role, flows: bool, external=None) -> Plan:
-    """A motion in the middle of, or before, a row."""
-    path = program.toolpath
-    n = len(path)
-    at = np.arange(n + 1) - (np.arange(n + 1) > row)
-    roles = np.zeros(n + 1)
-    roles[row] = role
-    position, rotation = path.position[at].copy(), path.rotation[at].copy()
-    centre, normal, sweep = (
-        path.arcs.centre[at].copy(),
-        path.arcs.normal[at].copy(),
-        path.arcs.sweep[at].copy(),
-    )
-    if path.kind[row] == Kind.CIRC and role == Role.INTERMEDIATE:
-        sweep[[row, row + 1]] /= 2
-        half = rotation_from_vector(-sweep[row] * normal[row])
-        position[row] = centre[row] + half @ (position[row + 1] - centre[row])
-    else:
-        position[row] = (path.position[row] + path.position[max(row - 1, 0)]) / 2
-        if role == Role.TRANSITION:
-            centre[row], normal[row], sweep[row] = np.nan, np.nan, np.nan
-    flowing = np.zeros(n + 1, bool)
-    flowing[row] = flows
-    share = np.ones(n + 1)
-    share[row] = 0.5
-    return Plan(at, roles, position, rotation, centre, normal, sweep, flowing, share, external)
-
-
 INSERTED = [
     ("v100,fine,t", Role.INTERMEDIATE, True, "v100,z0,t"),
     ("v100,z5,t", Role.INTERMEDIATE, True, "v100,z5,t"),
@@ -215,14 +188,7 @@ def test_inserted_motions_take_their_external_axes_along() -> None:
 
 def test_what_may_not_move_raises() -> None:
     program = module(f"MoveL pOther,v100,z1,t;\nMoveL {target(1, 2, 3)},v100,z1,t;\n")
-    plan = plan_of(program, {})
-    position = plan.position[:].copy()
-    position[0] = 1.0
-    moved = Plan(plan.source, plan.role, position, plan.rotation, plan.centre, plan.normal, plan.sweep)
-    with pytest.raises(ValueError, match="cannot be corrected"):
-        RAPID.edit_targets(program, moved, WRITING)
-    with pytest.raises(ValueError, match="cannot be divided"):
-        RAPID.edit_targets(program, divided(program, 1, Role.INTERMEDIATE, True), WRITING)
+    refuse_what_may_not_move(program)
 
 
 FORBIDDEN = [
@@ -289,3 +255,12 @@ def test_cfx_names_the_branch_that_the_robot_is_in(tmp_path: Path) -> None:
         ahead = np.cos(q[2]) * lengths.d4 + np.sin(q[2]) * lengths.a3  # of the lower arm's own line
         assert (ahead < 0) == bool(cfx & 2)
     assert len(seen) >= 4
+
+
+def test_a_comment_within_a_statement_is_not_taken_along() -> None:
+    said = EXTRA.replace(",9E9]", "! COMPENSATE OFF\n,9E9]")
+    tail = "v100 ! fast\n,z5,t"
+    program = module(f"MoveL {target(0, 0, 0)},v100,z5,t;\nMoveL {target(10, 0, 0, extra=said)},{tail};\n")
+    text = written(program, divided(program, 1, Role.INTERMEDIATE, True))
+    assert f"MoveL {target('5.000', 0, 0)},v100,z5,t;\n" in text.replace(" ,", ",")
+    assert f"{said}],{tail};" in text

@@ -9,22 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from case_files import TP_CASES, refusals
 
-from postproc.base.document import Document
-from postproc.base.findings import CODES
 from postproc.base.units import MM
-from postproc.languages import DIALECTS, detect
-from postproc.languages.dialect import Program, ReadingSettings, WritingSettings
-from postproc.toolpath import Plan
+from postproc.languages import detect
+from postproc.languages.dialect import Program, ReadingSettings
+from postproc.languages.tp.position_data import COMMON_POINT, read_positions
 from postproc.toolpath.initial_state import InitialState
 
-TP = DIALECTS["tp"]
-WRITING = WritingSettings(mm=3, deg=3)
-CASES = Path(__file__).parent / "programs" / "tp"
-GOOD = sorted(CASES.glob("*.ls"))
-BAD = sorted((CASES / "bad").glob("*.ls"))
-WRITTEN = {"FTP015", "FTP021"}
-"""Codes that only a writer gives."""
+CASES = TP_CASES
+TP = CASES.dialect
 POINT = """P[{n}]{{
    GP1:
 	UF : 1, UT : 1,		CONFIG : 'N U T, 0, 0, 0',
@@ -34,9 +28,7 @@ POINT = """P[{n}]{{
 """
 
 
-def read(raw: bytes | str, settings: ReadingSettings | None = None) -> Program:
-    raw = raw if isinstance(raw, bytes) else raw.encode("latin-1")
-    return TP.read((Document(Path("part.ls"), raw),), settings or ReadingSettings())
+read, codes = CASES.read, refusals
 
 
 def body(*statements: str, points: int = 9) -> Program:
@@ -44,43 +36,6 @@ def body(*statements: str, points: int = 9) -> Program:
     lines = "".join(f"{n:4d}:{one} ;\n" for n, one in enumerate(statements, 1))
     data = "".join(POINT.format(n=n, x=10.0 * n) for n in range(1, points + 1))
     return read(f"/PROG PART\n/ATTR\nLINE_COUNT\t= {len(statements)};\n/MN\n{lines}/POS\n{data}/END\n")
-
-
-def codes(program: Program) -> dict[int, str]:
-    return {row: finding.code for row, finding in program.toolpath.constraints.refused.items()}
-
-
-@pytest.mark.parametrize("path", GOOD, ids=lambda path: path.stem)
-def test_a_case_reads_as_its_dump(path: Path) -> None:
-    assert list(read(path.read_bytes()).toolpath.dump()) == path.with_suffix(".dump").read_text().splitlines()
-
-
-@pytest.mark.parametrize("path", BAD, ids=lambda path: path.stem)
-def test_a_bad_case_gives_the_codes_of_its_first_line(path: Path) -> None:
-    program = TP.read((Document(path, path.read_bytes()),))
-    expected = path.read_text("latin-1").splitlines()[0].removeprefix("! ").split()
-    assert sorted({finding.code for finding in program.findings}) == expected
-    for finding in program.findings:
-        assert finding.file == str(path)
-        assert finding.line > 0
-        assert finding.help or CODES[finding.code].explanation
-
-
-def test_every_code_has_a_case() -> None:
-    shown = {code for path in BAD for code in path.read_text("latin-1").splitlines()[0][2:].split()}
-    assert {code for code in CODES if code.startswith("FTP")} - WRITTEN <= shown
-    assert len(GOOD) + len(BAD) >= 70
-
-
-@pytest.mark.parametrize("path", [*GOOD, *BAD], ids=lambda path: path.stem)
-def test_every_case_is_claimed_and_stays_as_it_is(path: Path) -> None:
-    raw = path.read_bytes()
-    if path.stem != "no_main":
-        assert detect(path, raw) is TP
-    program = read(raw)
-    edits = TP.edit_targets(program, Plan.of(program.toolpath), WRITING)
-    assert not len(edits.edits)
-    assert not edits.unwritten
 
 
 VARIANTS = {
@@ -95,10 +50,23 @@ VARIANTS = {
 
 
 @pytest.mark.parametrize("name", VARIANTS)
-@pytest.mark.parametrize("path", GOOD, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", CASES.good, ids=lambda path: path.stem)
 def test_spelling_does_not_matter(path: Path, name: str) -> None:
     raw = path.read_bytes()
     assert list(read(VARIANTS[name](raw)).toolpath.dump()) == list(read(raw).toolpath.dump())
+
+
+@pytest.mark.parametrize("path", [*CASES.good, *CASES.bad], ids=lambda path: path.stem)
+def test_points_are_taken_as_the_general_rules_take_them(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    raw = path.read_bytes()
+    quick = read_positions(raw, 0, len(raw))
+    monkeypatch.setattr("postproc.languages.tp.position_data.COMMON_POINT", re.compile(rb"(?!)"))
+    assert read_positions(raw, 0, len(raw)) == quick
+
+
+def test_common_points_are_taken_at_once() -> None:
+    text = POINT.format(n=1, x=10.0).encode()
+    assert COMMON_POINT.match(text, text.index(b"{") + 1) is not None
 
 
 APPENDED = (" foo", ",foo", "+1", "[1]", " @", " 5", "Offset", " FINE", ":", "J")
@@ -147,14 +115,14 @@ def test_a_statement_with_a_word_more_is_not_read_as_without(statement: str) -> 
 
 
 def test_corners_and_stops() -> None:
-    path = read((CASES / "corners.ls").read_bytes()).toolpath
+    path = read((CASES.folder / "corners.ls").read_bytes()).toolpath
     nan = np.nan
     assert path.approximation / MM == pytest.approx([0, nan, nan, nan, 10, 0], nan_ok=True)
     assert path.stops.tolist() == [True, False, False, False, False, True]
 
 
 def test_forces_are_those_of_the_comments_that_were_passed_last() -> None:
-    path = read((CASES / "remarks.ls").read_bytes()).toolpath
+    path = read((CASES.folder / "remarks.ls").read_bytes()).toolpath
     assert [(note.row, note.text) for note in path.annotations] == [
         (0, "FORCE 0 100 50 @feed"), (1, "force off"), (2, "COMPENSATE OFF"),
     ]  # fmt: skip
@@ -162,7 +130,7 @@ def test_forces_are_those_of_the_comments_that_were_passed_last() -> None:
 
 
 def test_a_comment_in_force_below_another_one_is_repeated() -> None:
-    path = read((CASES / "remarks_jumped.ls").read_bytes()).toolpath
+    path = read((CASES.folder / "remarks_jumped.ls").read_bytes()).toolpath
     assert [(note.row, note.text) for note in path.annotations] == [(0, "FORCE 0 100 50")]
     program = body(
         "UFRAME_NUM=1", "UTOOL_NUM=1", "!FORCE 1 2 3", "JMP LBL[1]", "LBL[2]", "L P[1] 50mm/sec FINE", "END",
@@ -173,20 +141,20 @@ def test_a_comment_in_force_below_another_one_is_repeated() -> None:
 
 
 def test_the_place_of_a_motion_in_the_flow() -> None:
-    path = read((CASES / "jumps.ls").read_bytes()).toolpath
+    path = read((CASES.folder / "jumps.ls").read_bytes()).toolpath
     assert path.continues.tolist() == [True, False, False, False]
     assert dict(path.predecessors) == {1: (0, 1), 2: (-2,), 3: (1,)}
 
 
 def test_what_is_inserted_before() -> None:
-    options = read((CASES / "options.ls").read_bytes()).toolpath
+    options = read((CASES.folder / "options.ls").read_bytes()).toolpath
     assert sorted(options.constraints.no_insert_before) == [3, 4, 5, 6, 7, 8]
-    turned = read((CASES / "configurations.ls").read_bytes()).toolpath
+    turned = read((CASES.folder / "configurations.ls").read_bytes()).toolpath
     assert sorted(turned.constraints.no_insert_before) == [1, 2, 4]
 
 
 def test_frames_in_force_before_the_first_statement_are_those_of_the_cell() -> None:
-    raw = (CASES / "frames_of_points.ls").read_bytes()
+    raw = (CASES.folder / "frames_of_points.ls").read_bytes()
     assert {finding.code for finding in read(raw).findings} == {"FTP017"}
     known = read(raw, ReadingSettings(initial=InitialState(tool=1, base=1)))
     assert codes(known) == {1: "FTP005"}
@@ -201,13 +169,13 @@ def test_what_reads_the_position_locks_the_motion_before() -> None:
 def test_a_refused_arc_locks_its_start() -> None:
     program = body("UFRAME_NUM=1", "UTOOL_NUM=1", "L P[1] 50mm/sec FINE", "C P[2] PR[3] 50mm/sec FINE")
     assert list(program.toolpath.constraints.locked) == [0]
-    run = read((CASES / "bad" / "arc_run_off.ls").read_bytes()).toolpath
+    run = read((CASES.folder / "bad" / "arc_run_off.ls").read_bytes()).toolpath
     assert sorted(run.constraints.refused) == [2, 3, 4, 5, 6]
     assert list(run.constraints.locked) == [1]
 
 
 def test_w_p_r_turn_about_the_fixed_axes_x_y_z() -> None:
-    rotation = read((CASES / "rotations.ls").read_bytes()).toolpath.rotation
+    rotation = read((CASES.folder / "rotations.ls").read_bytes()).toolpath.rotation
     assert rotation[0] @ [0, 1, 0] == pytest.approx([0, 0, 1])
     assert rotation[1] @ [0, 0, 1] == pytest.approx([1, 0, 0])
     assert rotation[2] @ [1, 0, 0] == pytest.approx([0, 1, 0])
@@ -222,12 +190,12 @@ def test_w_p_r_turn_about_the_fixed_axes_x_y_z() -> None:
 
 def test_programs_in_other_languages_are_not_claimed() -> None:
     for name in ("krl/arcs.src", "fanuc/program.nc", "rapid/arc.mod"):
-        path = CASES.parent / name
+        path = CASES.folder.parent / name
         assert detect(path, path.read_bytes()) is not TP
 
 
 def test_the_sample_can_be_made_again_and_is_understood() -> None:
-    folder = CASES.parents[2] / "samples" / "m900ib_pocket"
+    folder = CASES.folder.parents[2] / "samples" / "m900ib_pocket"
     made = subprocess.run([sys.executable, folder / "make_pocket.py"], check=True, capture_output=True)
     raw = (folder / "pocket.ls").read_bytes()
     assert made.stdout.splitlines() == raw.splitlines()

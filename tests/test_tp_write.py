@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drawn_plans import divided, refuse_what_may_not_move
 
 import postproc
 from postproc.base.document import Document, Edit, Edits, Span, apply
@@ -134,29 +135,6 @@ def test_a_new_point_takes_no_number_that_a_statement_names() -> None:
     assert "L P[3] 50mm/sec FINE" in written(program, plan_of(program, {0: (1, 0, 0)}))
 
 
-def divided(program: Program, row: int, role: Role, flows: bool, external=None) -> Plan:
-    """A motion in the middle of, or before, a row."""
-    path = program.toolpath
-    n = len(path)
-    at = np.arange(n + 1) - (np.arange(n + 1) > row)
-    roles = np.zeros(n + 1)
-    roles[row] = role
-    position, rotation = path.position[at].copy(), path.rotation[at].copy()
-    arcs = path.arcs
-    centre, normal, sweep = arcs.centre[at].copy(), arcs.normal[at].copy(), arcs.sweep[at].copy()
-    if path.kind[row] == Kind.CIRC and role == Role.INTERMEDIATE:
-        sweep[[row, row + 1]] /= 2
-        half = rotation_from_vector(-sweep[row] * normal[row])
-        position[row] = centre[row] + half @ (position[row + 1] - centre[row])
-    else:
-        position[row] = (path.position[row] + path.position[max(row - 1, 0)]) / 2
-        if role == Role.TRANSITION:
-            centre[row], normal[row], sweep[row] = np.nan, np.nan, np.nan
-    flowing, share = np.zeros(n + 1, bool), np.ones(n + 1)
-    flowing[row], share[row] = flows, 0.5
-    return Plan(at, roles, position, rotation, centre, normal, sweep, flowing, share, external)
-
-
 INSERTED = [
     ("50mm/sec FINE", Role.INTERMEDIATE, True, "50mm/sec CNT100"),
     ("50mm/sec CNT60", Role.INTERMEDIATE, True, "50mm/sec CNT60"),
@@ -243,14 +221,7 @@ def test_inserted_motions_take_their_external_axes_along() -> None:
 
 def test_what_may_not_move_raises() -> None:
     program = listing([*FRAMES, "L P[9] 50mm/sec FINE", "L P[1] 50mm/sec FINE TA .5sec,DO[1]=ON"], [point(1)])
-    plan = plan_of(program, {})
-    position = plan.position[:].copy()
-    position[0] = 1.0
-    moved = Plan(plan.source, plan.role, position, plan.rotation, plan.centre, plan.normal, plan.sweep)
-    with pytest.raises(ValueError, match="cannot be corrected"):
-        TP.edit_targets(program, moved, WritingSettings(3, 3))
-    with pytest.raises(ValueError, match="cannot be divided"):
-        TP.edit_targets(program, divided(program, 1, Role.INTERMEDIATE, True), WritingSettings(3, 3))
+    refuse_what_may_not_move(program)
 
 
 FORBIDDEN = [

@@ -22,6 +22,22 @@ WORDS = [
     *b"G91 G90 G2 G3 G20 G18 G41 G81 M98 O1 TRAORI AC( IC( CR= TRANS MCALL REPEAT WHILE I1 R-5 N10".split(),
     *(b"\r", b"\n", b"\t", b"\0", b""),
 ]
+RAPID_WORDS = [
+    *b'{ } ( ) [ ] ; , : := = " \\ ! * + - \xff MoveL MoveC MoveJ MoveAbsJ MODULE ENDMODULE PROC ENDPROC'.split(),
+    *b"FOR ENDFOR WHILE ENDWHILE IF ENDIF ELSE THEN TEST CASE ENDTEST GOTO RETURN ERROR RETRY TRAP FUNC".split(),
+    *b"CONST PERS VAR robtarget num LOCAL TASK Offs( RelTool( \\Off \\On \\WObj:=w \\ID:=1 \\Corr [9E9] 9E9".split(),
+    *b"PDispOn PDispOff EOffsOn SearchL TriggL ConfL SingArea VelSet AccSet .trans.x .rot %% CirPathMode".split(),
+    *(b"\r", b"\n", b"\t", b"\0", b"", b"! FORCE 1 2 3\n", b"! COMPENSATE OFF\n"),
+]
+TP_WORDS = [
+    *b"{ } ( ) [ ] ; , : = ' \" \\ ! // * + - \xff L J C A S P[1] P[2:a] PR[1] R[1] LBL[1] JMP CALL END".split(),
+    *b"UFRAME_NUM=2 UTOOL_NUM=2 UFRAME[1]=PR[1] OVERRIDE=50% FINE CNT100 CR5 mm/sec cm/min deg/sec % sec".split(),
+    *b"Offset Offset,PR[1] Tool_Offset INC Skip,LBL[1] Weave Wjnt ACC80 TB COORD GP1: GP2: UF : UT CONFIG 'N".split(),
+    *b"/PROG /ATTR /APPL /MN /POS /END X Y Z W J1 E1 mm deg ***.** F IF FOR ENDFOR SELECT".split(),
+    *(b"\r", b"\n", b"\t", b"\0", b"", b"  1:  !FORCE 1 2 3 ;\n", b"  1:  !COMPENSATE OFF ;\n"),
+]
+OWN_WORDS = ((b"/MN", TP_WORDS), (b"MODULE", RAPID_WORDS))
+"""What a text has, and the words that mean something there."""
 
 
 def cut(raw: bytes, random: Random) -> bytes:
@@ -68,10 +84,11 @@ def tokens_moved(raw: bytes, random: Random) -> bytes:
     spans = [found.span() for found in _TOKEN.finditer(raw)]
     if not spans:
         return raw
+    words = next((own for sign, own in OWN_WORDS if sign in raw), WORDS)
     for _ in range(int(random.integers(1, 6))):
         start, stop = spans[int(random.integers(0, len(spans)))]
         a, b = spans[int(random.integers(0, len(spans)))]
-        word = raw[a:b] if random.random() < 0.5 else WORDS[int(random.integers(0, len(WORDS)))]
+        word = raw[a:b] if random.random() < 0.5 else words[int(random.integers(0, len(words)))]
         raw = raw[:start] + word + raw[start if random.random() < 0.4 else stop :]
     return raw
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import judged_motions
 import numpy as np
+from judged_motions import other_numbers
 
 from postproc.languages.dialect import Program
 from tp_judge.machine import DoneMotion
@@ -10,33 +12,12 @@ from tp_judge.machine import DoneMotion
 
 def disagreements(program: Program, done: list[DoneMotion]) -> list[str]:
     """What does not agree, in words."""
-    path = program.toolpath
-    refused = path.constraints.refused
-    row_of = {int(line): row for row, line in enumerate(path.line)}
-    wrong: list[str] = []
-    before: int | None = None
-    for motion in done:
-        row = row_of.get(motion.line)
-        if row is None:
-            return [*wrong, f"line {motion.line}: a motion that the reader does not have"]
-        if row in refused:
-            if refused[row].code == "FTP009":
-                wrong.append(f"line {motion.line}: it runs, and the reader says that it does not")
-        else:
-            wrong += [f"line {motion.line}: {what}" for what in _motion(program, row, motion)]
-        at = -2 if motion.from_elsewhere else -1 if before is None else before
-        if path.continues[row]:
-            if at != row - 1:
-                wrong.append(f"line {motion.line}: it starts after row {at}, not after the row before it")
-        elif at not in path.predecessors.get(row, ()):
-            wrong.append(f"line {motion.line}: row {at} is no predecessor of row {row}")
-        if motion.form == "C" and np.isfinite(path.arcs.sweep[row]) and at >= 0:
-            wrong += [f"line {motion.line}: {what}" for what in _arc(program, row, at, motion)]
-        before = row
-    return wrong
+    return judged_motions.disagreements(
+        program, done, "FTP009", _motion, lambda motion: -2 if motion.from_elsewhere else None
+    )
 
 
-def _motion(program: Program, row: int, motion: DoneMotion) -> list[str]:
+def _motion(program: Program, row: int, motion: DoneMotion, start: int) -> list[str]:
     path = program.toolpath
     wrong = []
     if motion.displaced:
@@ -49,23 +30,16 @@ def _motion(program: Program, row: int, motion: DoneMotion) -> list[str]:
             wrong.append(f"position {path.position[row] * 1e3} instead of {motion.target[:3]}")
         if not np.allclose(path.rotation[row], _matrix(motion.target[3:]), atol=1e-9):
             wrong.append("another orientation")
-    for word, claimed, actual in (
-        ("speed", path.feed[row] * 1e3, motion.speed),
-        ("corner", path.approximation[row] * 1e3, motion.corner),
-    ):
-        if actual is not None and np.isfinite(claimed) and abs(claimed - actual) > 1e-9:
-            wrong.append(f"{word} {claimed} instead of {actual}")
+    wrong += other_numbers(
+        row, [("speed", path.feed, motion.speed), ("corner", path.approximation, motion.corner)]
+    )
     if bool(path.stops[row]) != motion.stops:
         wrong.append("it stops, or does not")
     frames = path.frames[path.base[row]].number, path.frames[path.tool[row]].number
     if frames != motion.frames:
         wrong.append(f"frames {frames} instead of {motion.frames}")
-    force = None
-    for note in path.annotations:
-        if note.row <= row and note.text.upper().startswith("FORCE"):
-            force = note.text
-    if force != motion.force:
-        wrong.append(f"force {force!r} instead of {motion.force!r}")
+    if motion.form == "C" and np.isfinite(path.arcs.sweep[row]) and start >= 0:
+        wrong += _arc(program, row, start, motion)
     return wrong
 
 

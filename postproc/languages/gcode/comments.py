@@ -10,11 +10,11 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Ints
 from postproc.base.document import Document, Span
+from postproc.languages.core.row_facts import SPEAKS
 from postproc.languages.dialect import MARK
 from postproc.languages.gcode.source import Source
 from postproc.toolpath import Annotation
 
-_SPEAKS = re.compile(r"(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
 _HEAD = re.compile(
     rb"[ \t]*+(?:%[^\r\n]*+|;[ \t]*+\$PATH[ \t]*+=[^\r\n]*+"
     rb"|(?:O|:)[ \t]*+(?:\d++|<[^>\r\n]*+>)[ \t]*+(?:\([^)\r\n]*+\)|;[^\r\n]*+)?[ \t]*+)"
@@ -49,7 +49,7 @@ def remarks(document: Document, source: Source, steps: Ints, in_text_order: bool
         said = _text(raw[start:stop])
         if marker is not None and start == marker.start:
             continue
-        if _SPEAKS.match(said):
+        if SPEAKS.match(said):
             speaking.append(Annotation(row, said, number))
         elif own and said:
             others.append(Annotation(row, said, number))

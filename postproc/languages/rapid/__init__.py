@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 from postproc.base.document import Document, Edit
+from postproc.languages.core.single_file import BEGIN, SingleFileDialect
 from postproc.languages.dialect import (
     MARK,
     PLAIN,
@@ -23,11 +24,9 @@ _MODULE = re.compile(
 )
 _ROUTINE = re.compile(rb"^[ \t]*+(?:LOCAL[ \t]++)?PROC[ \t]++[A-Za-z][A-Za-z0-9_]*+[ \t]*+\(", re.I | re.M)
 _SUFFIXES = frozenset([".mod", ".modx", ".prg", ".sys", ".sysx"])
-BEGIN = 65536
-"""Bytes from the start of a file that are looked at."""
 
 
-class RapidDialect:
+class RapidDialect(SingleFileDialect):
     """RAPID as a ``Dialect``."""
 
     name = "rapid"
@@ -39,14 +38,6 @@ class RapidDialect:
         if _MODULE.search(start) is not None:
             return True
         return path.suffix.lower() in _SUFFIXES and _ROUTINE.search(start) is not None
-
-    def companions(self, path: Path) -> list[Path]:
-        return []
-
-    def siblings(
-        self, program: Program, settings: ReadingSettings, beside: Path | None = None
-    ) -> tuple[Document, ...]:
-        return ()
 
     def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
         from postproc.languages.rapid import module_reader  # takes its time to load

@@ -9,6 +9,7 @@ from postproc.languages.rapid.data_types import RECORDS, SPEEDS, ZONES, Componen
 from postproc.languages.rapid.evaluation import Evaluator, Typed
 from postproc.languages.rapid.instructions import HARMLESS, MOTIONS, WRITERS, is_motion, sort_arguments
 from postproc.languages.rapid.motion_facts import is_direct
+from postproc.languages.rapid.parsing import declaration_at
 from postproc.languages.rapid.syntax_tree import (
     Argument,
     AssignmentStatement,
@@ -45,9 +46,9 @@ PREDEFINED: Mapping[bytes, Typed] = _predefined()
 class DeclaredData:
     """Names of the module level: type, and value where it is a constant or before anything is assigned."""
 
-    def __init__(self, module: Module, shadowed: frozenset[bytes]) -> None:
-        self.types: dict[bytes, bytes] = {}
+    def __init__(self, module: Module, shadowed: frozenset[bytes], raw: bytes) -> None:
         self.lines: dict[bytes, int] = {}
+        self._raw, self._targets = raw, module.targets
         self._declarations: dict[bytes, DataDeclaration] = {}
         self._values: dict[bytes, Value] = {}
         self.evaluator = Evaluator(self.look, module.records, shadowed)
@@ -55,23 +56,35 @@ class DeclaredData:
         for one in module.declarations:
             twice = one.name in self._declarations
             self._declarations[one.name] = one
-            self.types[one.name] = one.type
             self.lines[one.name] = one.start
             if twice:
                 self._values[one.name] = UnknownData(f"{_shown(one.name)} is declared twice")
         for unclear in module.unclear:
-            for name in unclear.names & self._declarations.keys():
+            for name in unclear.names & (self._declarations.keys() | self._targets.keys()):
                 self._values[name] = UnknownData(f"a line with {_shown(name)} is not understood")
 
     def __contains__(self, name: bytes) -> bool:
-        return name in self._declarations
+        return name in self._declarations or name in self._targets
+
+    def _declaration(self, name: bytes) -> DataDeclaration | None:
+        """That of a name; None where the module does not declare it."""
+        one = self._declarations.get(name)
+        if one is None and name in self._targets:
+            one = self._declarations[name] = declaration_at(self._raw, self._targets[name])
+        return one
 
     def is_constant(self, name: bytes) -> bool:
-        return self._declarations[name].kind == b"CONST"
+        declaration = self._declaration(name)
+        return declaration is not None and declaration.kind == b"CONST"
+
+    def type_of(self, name: bytes) -> bytes:
+        """The type of a name of the module, b"" of another one."""
+        declaration = self._declaration(name)
+        return b"" if declaration is None else declaration.type
 
     def look(self, name: bytes) -> Typed:
         """Value and type of a name of the module, or of the controller."""
-        declaration = self._declarations.get(name)
+        declaration = self._declaration(name)
         if declaration is None:
             if name in PREDEFINED:
                 return PREDEFINED[name]
@@ -130,7 +143,7 @@ class Usage:
         self.moves: set[bytes] = set()
         self._called: set[bytes] = set()
         self._set: set[bytes] = set()
-        self._module_data = {declaration.name for declaration in module.declarations}
+        self._module_data = {declaration.name for declaration in module.declarations} | module.targets.keys()
         self._own = {routine.name for routine in module.routines}
         self._copying = {r.name for r in module.routines if not any(p.mode for p in r.parameters)}
         for one in module.declarations:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from postproc.base.geometry import rotation_from_vector
+from postproc.base.geometry import rotation_from_abc, rotation_from_vector
 from postproc.base.units import DEG
 from postproc.languages.rapid.data_types import RECORDS, Components
 from postproc.languages.rapid.quaternions import quaternion_from_rotation, rotation_from_quaternion
@@ -185,6 +185,8 @@ class Evaluator:
             return _offs(values), b"ROBTARGET"
         if name == b"RELTOOL" and len(required) == 4:
             return self._rel_tool(values, arguments), b"ROBTARGET"
+        if name in (b"ORIENTZYX", b"NORIENT") and len(required) == len(arguments):
+            return _orientation(values), b"ORIENT"
         function = _FUNCTIONS.get(name)
         number = number_of(values[0]) if len(values) == len(arguments) == 1 else None
         if function is not None and number is not None:
@@ -231,6 +233,24 @@ class Evaluator:
         return GroupValue((place, turned, *map(plain, target.items[2:])))
 
 
+def is_component(target: Expression) -> bool:
+    """Whether an assignment goes to a component of a variable that is no array."""
+    base: Expression | None = None
+    while isinstance(target, Index | Component):
+        base, target = target, target.base
+    return isinstance(base, Component)
+
+
+def unknown_record(
+    kind: bytes, components: Callable[[bytes], Components], unknown: UnknownData, depth: int = 0
+) -> Value:
+    """A record of a type of which no component is known."""
+    parts = components(kind) if depth < 8 else ()
+    if not parts:
+        return unknown
+    return GroupValue(tuple(unknown_record(part, components, unknown, depth + 1) for _, part in parts))
+
+
 def _offs(values: list[Value]) -> Value:
     """The target displaced in the axes of its work object."""
     target, steps = values[0], [number_of(value) for value in values[1:]]
@@ -241,6 +261,21 @@ def _offs(values: list[Value]) -> Value:
         return UnknownData("it is no target")
     place = GroupValue(tuple(Leaf(x + (d or 0.0)) for x, d in zip(position, steps, strict=True)))
     return GroupValue((place, *map(plain, target.items[1:])))
+
+
+def _orientation(values: list[Value]) -> Value:
+    """OrientZYX: of turns about z, the new y and the new x axis [deg]; NOrient: one of length 1."""
+    angles = [number_of(value) for value in values]
+    if len(angles) == 3 and None not in angles:
+        abc = np.array([angles], float) * DEG
+        turn = quaternion_from_rotation(rotation_from_abc(abc), np.array([[1.0, 0.0, 0.0, 0.0]]))[0]
+    else:
+        parts = numbers_of(values[0], 4) if len(values) == 1 else None
+        turn = np.array(parts if parts is not None else np.zeros(4))
+        if not 0.5 < float(np.linalg.norm(turn)) < 2:
+            return UnknownData("it is no orientation")
+        turn = turn / np.linalg.norm(turn)
+    return GroupValue(tuple(Leaf(float(one)) for one in turn))
 
 
 def _combined(operator: bytes, values: list[Value]) -> Value:

@@ -8,14 +8,12 @@ import numpy as np
 
 from postproc.base.decimals import fixed_one
 from postproc.base.document import Edit, Span
+from postproc.languages.core.plan_rows import blocks
 from postproc.languages.dialect import Role
 from postproc.languages.rapid.data_types import FLY_BY
 from postproc.languages.rapid.plan_writer import PlanWriter, PointNumbers, aggregate
-from postproc.languages.rapid.target_places import MotionText, PointText
+from postproc.languages.rapid.target_places import MotionText, PointText, in_one_line
 from postproc.toolpath import Kind
-
-BLOCK = 1 << 14
-"""Motions whose targets are computed at a time."""
 
 
 def insertions(task: PlanWriter) -> tuple[list[Edit], dict[int, str]]:
@@ -27,11 +25,10 @@ def insertions(task: PlanWriter) -> tuple[list[Edit], dict[int, str]]:
     edits: list[Edit] = []
     unfit: dict[int, str] = {}
     document = task.program.documents[0]
-    for at in range(0, len(chosen), BLOCK):
-        motions = chosen[at : at + BLOCK]
+    for motions in blocks(chosen):
         rows = task.plan.source[motions]
         said = task.places.numbers(rows)
-        wanted, vias = task.wanted(said, rows, motions), task.vias(motions)
+        wanted, vias = task.wanted(said, rows, motions), task.middles(motions)
         external = None if task.plan.external is None else task.plan.external[motions]
         for k, (motion, row) in enumerate(zip(motions.tolist(), rows.tolist(), strict=True)):
             text = task.text(row)
@@ -65,7 +62,7 @@ def _line(task: PlanWriter, motion: int, row: int, text: MotionText, target: byt
         word = {Kind.LIN: b"MoveL", Kind.CIRC: b"MoveC"}.get(Kind(task.path.kind[row]), b"MoveJ")
     passing = FLY_BY if task.path.stops[row] else text.zone
     zone = passing if task.plan.flows[motion] else b"fine"
-    parts = [target, *(b" ".join(part.split()) for part in (text.speed, zone, text.tool))]
+    parts = [target, *map(in_one_line, (text.speed, zone, text.tool))]
     indent = task.raw[start : text.start]
     return indent + word + b" " + b",".join(parts) + b";" + task.program.documents[0].newline
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from codecs import BOM_UTF8
+from functools import partial
 
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
 from postproc.base.memory import without_garbage_collection
+from postproc.languages.core.row_facts import not_understood
 from postproc.languages.dialect import EditSyntax, Program, ReadingSettings
 from postproc.languages.rapid.module_toolpath import module_toolpath
 from postproc.languages.rapid.parsing import ModuleParser
@@ -15,8 +17,6 @@ from postproc.languages.rapid.remarks import find_marker
 from postproc.languages.rapid.syntax_tree import Module
 
 SYNTAX = EditSyntax(comment=b"!", numbers_after=b"[,")
-SHOWN = 20
-"""Statements that are not understood are reported one by one up to this number."""
 
 
 @without_garbage_collection()
@@ -27,7 +27,7 @@ def read(documents: tuple[Document, ...], settings: ReadingSettings, fast: bool 
     """
     document = documents[0]
     module = ModuleParser(document.raw, fast).file()
-    flow = Propagation(module)
+    flow = Propagation(module, document.raw)
     findings: list[Finding] = []
     try:
         flow.run()
@@ -74,13 +74,8 @@ def _structure(document: Document, module: Module, flow: Propagation) -> list[Fi
             message = f"{name} is the name of several routines, or a label of it is missing or there twice"
             found.append(_finding(document, "RAP007", message, routine.start))
     unclear = [*module.unclear, *(one for one in flow.unread.values() if one.start not in flow.facts)]
-    for one in unclear[:SHOWN]:
-        text = " ".join(document.raw[one.start : one.stop].decode("latin-1").split())[:60]
-        found.append(_finding(document, "RAP001", f"{text!r} is not understood", one.start))
-    if len(unclear) > SHOWN:
-        message = f"{len(unclear) - SHOWN} further statements are not understood"
-        found.append(_finding(document, "RAP001", message, unclear[SHOWN].start))
-    return found
+    texts = [(document.raw[one.start : one.stop], one.start) for one in unclear]
+    return found + not_understood(texts, partial(_finding, document, "RAP001"))
 
 
 def _calls(document: Document, flow: Propagation) -> list[Finding]:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
-from dataclasses import replace
-from itertools import chain
 
 import numpy as np
 
@@ -14,6 +11,7 @@ from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses, arc_through
 from postproc.base.units import DEG, MM
+from postproc.languages.core.row_facts import OTHER_PATHS, follow_on, grouped, moving_external, only_used
 from postproc.languages.rapid.module_frames import ModuleFrames
 from postproc.languages.rapid.module_rows import ModuleRows, module_rows
 from postproc.languages.rapid.propagation import Propagation
@@ -31,7 +29,6 @@ from postproc.toolpath import (
 )
 from postproc.toolpath.initial_state import Symbol
 
-OTHER_PATHS = "several paths of the program lead to it or from the motion before it"
 OTHER_QUADRANTS = "its quadrants (cf1, cf4, cf6) are not those of the motion before, and ConfL is on"
 NO_WORDS = "its configuration or external axes are not known in numbers"
 BLOCK = 1 << 15
@@ -90,23 +87,15 @@ def module_toolpath(
         annotations=remarks.annotations,
         comments=remarks.comments,
     )
-    toolpath = _only_used(toolpath)
+    toolpath = only_used(toolpath)
     single = np.flatnonzero(~rows.texts.is_plain(np.arange(n)))
     numbers = FewRows(single, rows.numbers[single], n)
     places = RapidSourceMap(document.raw, numbers, rows.vias, rows.texts, frozenset(flow.usage.read))
-    findings = [*remark_findings, *_grouped(rows, refused), *_moving_external(document, rows)]
+    findings = [*remark_findings, *grouped(refused, rows.lines)]
+    moving = moving_external(rows.external)
+    if moving is not None:
+        findings.append(_finding(document, rows, moving[0], "RAP022", moving[1]))
     return toolpath, places, findings
-
-
-def _only_used(path: Toolpath) -> Toolpath:
-    """Without the frames that no motion has: nobody needs to know their pose."""
-    used = np.unique(np.concatenate([path.base, path.tool]))
-    used = used[used >= 0]
-    new = np.full(len(path.frames) + 1, -1, np.int32)
-    new[used] = np.arange(len(used))
-    return replace(
-        path, base=new[path.base], tool=new[path.tool], frames=tuple(path.frames[i] for i in used.tolist())
-    )
 
 
 def _rotations(quaternions: Floats) -> Floats:
@@ -120,13 +109,9 @@ def _rotations(quaternions: Floats) -> Floats:
 
 def _continues(rows: ModuleRows) -> Bools:
     """(N,) each motion surely starts where the row before it ends, and no other motion starts there."""
-    found = np.arange(len(rows)) < rows.never_from
     first = [row for row in rows.first[:-1].tolist() if row < rows.never_from]
     before = [rows.before(row) for row in first]
-    followers = Counter(chain.from_iterable(before))
-    for row, places in zip(first, before, strict=True):
-        found[row] = places == (row - 1,) and followers[row - 1] == 1
-    return found
+    return follow_on(np.arange(len(rows)) < rows.never_from, first, before)
 
 
 def _arcs(rows: ModuleRows, frames: ModuleFrames, position: Floats, kind: Ints) -> Arcs:
@@ -243,34 +228,3 @@ def _finding(document: Document, rows: ModuleRows, row: int, code: str, message:
     line = int(rows.lines[row])
     column = int(rows.starts[row]) - int(document.line_starts[line - 1]) + 1
     return Finding(code, message, str(document.path), line, column)
-
-
-def _grouped(rows: ModuleRows, refused: Mapping[int, Finding]) -> list[Finding]:
-    """The refusals, those of one code and cause as one finding."""
-    groups: dict[tuple[str, str], list[int]] = {}
-    for row, finding in refused.items():
-        groups.setdefault((finding.code, finding.message), []).append(row)
-    found = []
-    for chosen in groups.values():
-        first = refused[chosen[0]]
-        if len(chosen) > 1:
-            lines = rows.lines[chosen]
-            message = f"{first.message}; {len(chosen)} motions, lines {lines.min()} to {lines.max()}"
-            first = replace(first, message=message)
-        found.append(first)
-    return found
-
-
-def _moving_external(document: Document, rows: ModuleRows) -> list[Finding]:
-    """External axes that do not stay where they are first."""
-    moving = []
-    for axis in range(6):
-        values = rows.external[:, axis]
-        stated = values[~np.isnan(values)]
-        if len(stated) and (not np.isfinite(stated).all() or (stated != stated[0]).any()):
-            moving.append((int(np.argmax(~np.isnan(values) & (values != stated[0]))), f"E{axis + 1}"))
-    if not moving:
-        return []
-    verb = "moves" if len(moving) == 1 else "move"
-    message = f"{', '.join(name for _, name in moving)} {verb}; the cell must state what external axes carry"
-    return [_finding(document, rows, min(moving)[0], "RAP022", message)]

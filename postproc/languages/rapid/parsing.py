@@ -9,6 +9,7 @@ from __future__ import annotations
 from codecs import BOM_UTF8
 
 from postproc.languages.rapid.expression_syntax import RapidExpressionParser, SyntaxProblem
+from postproc.languages.rapid.named_lines import NamedReader, NamesElsewhere
 from postproc.languages.rapid.plain_lines import PlainReader
 from postproc.languages.rapid.syntax_tree import (
     AssignmentStatement,
@@ -41,6 +42,7 @@ _CLOSING = frozenset(
 )
 _OUTER = frozenset(b"PROC FUNC TRAP ENDPROC ENDFUNC ENDTRAP ENDMODULE LOCAL TASK".split()) | _HANDLERS
 _RESERVED = _CLOSING | frozenset(b"THEN DO FROM TO STEP WITH ENDRECORD MODULE RECORD ALIAS".split())
+NOWHERE_ELSE = NamesElsewhere()
 DEEPEST = 60
 """Blocks in each other."""
 
@@ -48,14 +50,15 @@ DEEPEST = 60
 class ModuleParser(RapidExpressionParser):
     """Reads one file."""
 
-    def __init__(self, raw: bytes, fast: bool = True) -> None:
-        """``fast``: runs of common lines as one statement."""
+    def __init__(self, raw: bytes, fast: bool = True, without: NamesElsewhere = NOWHERE_ELSE) -> None:
+        """``fast``: runs of common lines as one statement; ``without``: names that are not taken in runs."""
         super().__init__(Tokens(raw, len(BOM_UTF8) if raw.startswith(BOM_UTF8) else 0))
-        self.raw = raw
+        self.raw, self._without = raw, without
         self.module = Module()
         self._remarks = 0  # comments that are in the tree
         self._broken = -1
         self._plain = PlainReader(raw) if fast else None
+        self._named = NamedReader(raw, without) if fast else None
 
     def file(self) -> Module:
         """All modules of the file as one."""
@@ -77,6 +80,11 @@ class ModuleParser(RapidExpressionParser):
             else:
                 module.unclear.append(self._skip())
         module.remarks += self._drain(len(self.raw))
+        if self._named is not None:
+            module.targets = self._named.targets.starts
+            elsewhere = self._named.elsewhere({one.name for one in module.declarations})
+            if any(elsewhere):
+                return ModuleParser(self.raw, True, elsewhere | self._without).file()
         return module
 
     def _header(self) -> None:
@@ -97,6 +105,10 @@ class ModuleParser(RapidExpressionParser):
         """A declaration or a routine."""
         start = self.next.start
         self.module.remarks += self._drain(start)
+        end = -1 if self._named is None else self._named.declared(start)
+        if end >= 0:
+            self.tokens.jump(end)
+            return
         local = False
         while self._word() in (b"LOCAL", b"TASK"):
             local = self.take().text == b"LOCAL" or local
@@ -211,9 +223,9 @@ class ModuleParser(RapidExpressionParser):
 
     def _common(self, statement: Statement) -> Statement:
         """A statement, or the run of common lines that it starts, which is passed."""
-        if self._plain is None or not isinstance(statement, Instruction):
+        if self._plain is None or self._named is None or not isinstance(statement, Instruction):
             return statement
-        run = self._plain.run(statement)
+        run = self._plain.run(statement) or self._named.run(statement)
         if run is None:
             return statement
         self.tokens.jump(run.end)
@@ -255,6 +267,20 @@ class ModuleParser(RapidExpressionParser):
 
     def _simple(self, start: int) -> Statement:
         """An assignment, a label, or an instruction."""
+        if self.sign(b"%"):  # the name of the procedure is computed
+            self.expression()
+            self.need(b"%")
+            name_stop = self.tokens.before
+            arguments = self.arguments(b";")
+            self.need(b";")
+            return Instruction(self.raw[start:name_stop], arguments, start, self.tokens.before)
+        if self._word() == b"CONNECT":
+            self.take()
+            self.expression()
+            self.word(b"WITH")
+            self.name()
+            self.need(b";")
+            return Instruction(b"CONNECT", (), start, self.tokens.before)
         if self.next.kind != NAME or self.next.text in _RESERVED:
             raise SyntaxProblem
         name = self.take()
@@ -272,6 +298,13 @@ class ModuleParser(RapidExpressionParser):
         arguments = self.arguments(b";")
         self.need(b";")
         return Instruction(name.text, arguments, start, self.tokens.before)
+
+    def declaration(self) -> DataDeclaration:
+        """The one that comes, which is passed.  Raises SyntaxProblem where none does."""
+        start = self.next.start
+        while self._word() in (b"LOCAL", b"TASK"):
+            self.take()
+        return self._declaration(start)
 
     def _declaration(self, start: int) -> DataDeclaration:
         kind = self.take().text
@@ -386,3 +419,10 @@ class ModuleParser(RapidExpressionParser):
             found.append(Remark(text, not line.removeprefix(BOM_UTF8).strip(), start))
             self._remarks += 1
         return found
+
+
+def declaration_at(raw: bytes, at: int) -> DataDeclaration:
+    """The declaration at a byte, which is one.  Raises SyntaxProblem where it is none: a defect of the caller."""
+    parser = ModuleParser(raw, fast=False)
+    parser.tokens.jump(at)
+    return parser.declaration()

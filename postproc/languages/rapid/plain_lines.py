@@ -19,21 +19,21 @@ WORDS = frozenset([b"MOVEL", b"MOVEJ"])
 CORRECTED = 7
 """Numbers of a target that can be corrected: x, y, z, q1 to q4."""
 
-_B = rb"[ \t]*+"
+BLANK = rb"[ \t]*+"
 _NUMBER = rb"[-+]?(?:[0-9]++(?:\.[0-9]*+)?+|\.[0-9]++)(?:[eE][-+]?[0-9][0-9]?+)?+"
 
 
 def _list(items: list[bytes]) -> bytes:
-    return rb"\[" + (_B + rb",").join(_B + item for item in items) + _B + rb"\]"
+    return rb"\[" + (BLANK + rb",").join(BLANK + item for item in items) + BLANK + rb"\]"
 
 
-_TARGET = _list([_list([_NUMBER] * count) for count in (3, 4, 4, 6)])
-_WORD, _TAIL = rb"[Mm][Oo][Vv][Ee][LlJj]", _B + rb",[^;!\"()\r\n]++;"
-_END = _B + rb"\r?\n"
-_LINE = re.compile(rb"(" + _WORD + rb")[ \t]++" + _TARGET + rb"(" + _TAIL + rb")" + _END)
+TARGET = _list([_list([_NUMBER] * count) for count in (3, 4, 4, 6)])
+MOTION_WORD, MOTION_TAIL = rb"[Mm][Oo][Vv][Ee][LlJj]", BLANK + rb",[^;!\"()\r\n]++;"
+LINE_END = BLANK + rb"\r?\n"
+_LINE = re.compile(rb"(" + MOTION_WORD + rb")[ \t]++" + TARGET + rb"(" + MOTION_TAIL + rb")" + LINE_END)
 _RUN = re.compile(
     _LINE.pattern
-    + rb"(?:" + _B + rb"\1[ \t]++" + _TARGET + rb"\2" + _END + rb"){%d,%d}+" % (FEWEST - 1, MOST - 1)
+    + rb"(?:" + BLANK + rb"\1[ \t]++" + TARGET + rb"\2" + LINE_END + rb"){%d,%d}+" % (FEWEST - 1, MOST - 1)
 )  # fmt: skip
 """Lines that are alike but for the numbers of their targets."""
 _EACH_NUMBER = re.compile(rb"[-+0-9.eE]++")
@@ -72,7 +72,7 @@ class PlainReader:
         begins = np.concatenate([[0], np.flatnonzero(text == 0x0A)[:-1] + 1])
         semicolons = np.flatnonzero(text == 0x3B)
         stops = semicolons[np.searchsorted(semicolons, begins)] + 1
-        first_at, after = _numbers(text, begins)
+        first_at, after = number_places(text, begins)
         values, _ = literals(text, first_at.ravel(), after.ravel(), other_literal)
         extras, which = self._extras(after[:, -1] + start, stops - tail + start)
         if not (np.isfinite(values).all() and np.isfinite(extras).all()):
@@ -96,12 +96,17 @@ class PlainReader:
         raw = self._raw
         rests = [raw[a:b] for a, b in zip(start.tolist(), stop.tolist(), strict=True)]
         number = {rest: place for place, rest in enumerate(dict.fromkeys(rests))}
-        known = [[float(one) for one in _EACH_NUMBER.findall(rest)] for rest in number]
+        known = [each_number(rest) for rest in number]
         return np.array(known), np.fromiter((number[rest] for rest in rests), np.int64, len(rests))
 
 
-def _numbers(text: NDArray[np.uint8], begins: Ints) -> tuple[Ints, Ints]:
-    """Where the first numbers (K, 7) after the starts (K,) of lines start, and where they end."""
+def each_number(text: bytes) -> list[float]:
+    """The numbers of lists."""
+    return [float(one) for one in _EACH_NUMBER.findall(text)]
+
+
+def number_places(text: NDArray[np.uint8], begins: Ints) -> tuple[Ints, Ints]:
+    """Where the first numbers (K, 7) after the places begins (K,) in text (M,) start, and where they end."""
     inside = _DIGITS[text]
     # an exponent, and its sign, are of the number before
     inside[1:] |= ((text[1:] | 0x20) == ord("e")) & inside[:-1]

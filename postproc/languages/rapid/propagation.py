@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from postproc.languages.core.row_facts import SPEAKS
 from postproc.languages.rapid.declared_data import DeclaredData, Usage, first_value, names_in, walk
-from postproc.languages.rapid.evaluation import Evaluator, Typed
+from postproc.languages.rapid.evaluation import Evaluator, Typed, is_component, unknown_record
 from postproc.languages.rapid.flow_graph import FlowGraph, Step
 from postproc.languages.rapid.instructions import (
     DISPLACING,
@@ -46,6 +47,7 @@ from postproc.toolpath import ArcFrame, Kind, OrientationMode
 
 OTHER = MotionForm(Kind.OTHER)
 _SETTINGS = frozenset([b"TOOLDATA", b"WOBJDATA", b"SPEEDDATA", b"ZONEDATA"])
+_MODES = DISPLACING | {b"CONFL", b"CONFJ", b"SINGAREA", b"CIRPATHMODE", b"VELSET"}
 MOST_STEPS = 4_000_000
 """Statements that are followed; each statement of a file counts for four more."""
 NOT_CONSTANT = " is not constant: "
@@ -58,6 +60,15 @@ def _length(statement: object) -> int:
     return len(statement) if isinstance(statement, PlainMotions) else 1
 
 
+def _sets_modes(routine: RapidRoutine) -> bool:
+    """Whether a routine changes how motions after it are meant."""
+    return any(
+        one.name in _MODES if isinstance(one, Instruction) else SPEAKS.match(one.text)
+        for one in walk(routine.body)
+        if isinstance(one, Instruction | Remark)
+    )
+
+
 class TooLong(Exception):
     """The flow is too long to follow."""
 
@@ -68,7 +79,7 @@ class Propagation:
     of its first call; ``reads``: where the place of the robot is read -> the motions after which; ``unread``:
     statements that are not understood."""
 
-    def __init__(self, module: Module) -> None:
+    def __init__(self, module: Module, raw: bytes) -> None:
         self.module = module
         self.routines: dict[bytes, RapidRoutine] = {}
         self.ambiguous: set[bytes] = set()
@@ -77,7 +88,7 @@ class Propagation:
                 self.ambiguous.add(routine.name)
             self.routines[routine.name] = routine
         functions = frozenset(r.name for r in module.routines if r.kind == b"FUNC")
-        self.data = DeclaredData(module, functions)
+        self.data = DeclaredData(module, functions, raw)
         self.usage = Usage(module)
         self.facts: dict[int, MotionFact] = {}
         self.passed: dict[int, tuple[Remark, int]] = {}
@@ -288,6 +299,10 @@ class Propagation:
         if self._runner.recording:
             self.calls.setdefault(step.name, step.start)
         self._change(step.arguments, state)
+        if step.name.startswith(b"%"):  # any procedure, those of this file among them
+            self._forget_all(self.usage.assigned, state)
+            if any(_sets_modes(one) for one in self.module.routines if one not in self._active):
+                state.displaced |= {b"a procedure whose name is computed"}
         if moves:
             state.last = frozenset([ELSEWHERE])
 
@@ -379,7 +394,9 @@ class Propagation:
         key, shown = self._key(variable), variable.decode("latin-1")
         if key == variable and (variable not in self.data or self.data.is_constant(variable)):
             return
-        old, _ = self._look(state)(variable)
+        old, kind = self._look(state)(variable)
+        if isinstance(old, UnknownData) and is_component(target):
+            old = unknown_record(kind, self._evaluator(state).components, old)
         new = value
         if isinstance(value, UnknownData) and NOT_CONSTANT not in value.reason:
             new = UnknownData(f"{shown}{NOT_CONSTANT}{value.reason}")
@@ -423,7 +440,7 @@ class Propagation:
 
     def _type(self, name: bytes, key: bytes) -> bytes:
         if key == name:
-            return self.data.types.get(name, b"")
+            return self.data.type_of(name)
         return b"NUM" if b" " in name else self._own(self._active[-1])[name][1]
 
     def _evaluator(self, state: ProgramState) -> Evaluator:

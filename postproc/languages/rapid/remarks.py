@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
 
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
+from postproc.languages.core.row_facts import SPEAKS, PlacedRemarks
 from postproc.languages.dialect import MARK
 from postproc.languages.rapid.declared_data import walk
 from postproc.languages.rapid.module_rows import ModuleRows
@@ -14,13 +14,7 @@ from postproc.languages.rapid.propagation import Propagation
 from postproc.languages.rapid.syntax_tree import Remark
 from postproc.toolpath import Annotation
 
-_SPEAKS = re.compile(r"(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
 _MARKER = re.compile(rb"[ \t]*![ \t]*" + MARK.encode() + rb"[^\r\n]*")
-
-
-class PlacedRemarks(NamedTuple):
-    annotations: tuple[Annotation, ...]
-    comments: tuple[Annotation, ...]
 
 
 def put_remarks(
@@ -33,14 +27,14 @@ def put_remarks(
     """
     notes: list[tuple[int, int, Annotation]] = []
     for order, (remark, row) in enumerate(flow.passed.values()):
-        if _SPEAKS.match(remark.text):
+        if SPEAKS.match(remark.text):
             notes.append((row, order, _annotation(document, row, remark)))
     shown: dict[str, Remark | None] = {"FORCE": None, "COMPENSATE": None}
     passed = iter(flow.passed.values())
     coming = next(passed, None)
     for row, stop, fact in rows.each():
         while coming is not None and coming[1] <= row:
-            word = _SPEAKS.match(coming[0].text)
+            word = SPEAKS.match(coming[0].text)
             if word is not None:
                 shown[word[0].upper()] = coming[0]
             coming = next(passed, None)
@@ -76,7 +70,7 @@ def _others(
     comments, findings = [], []
     for remark in sorted(found, key=lambda one: one.start):
         line, column = document.place(remark.start)
-        if _SPEAKS.match(remark.text):
+        if SPEAKS.match(remark.text):
             if remark.start not in flow.passed:
                 message = f"the comment {remark.text[:40]!r} is where no statement is run"
                 findings.append(Finding("RAP016", message, str(document.path), line, column))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -134,13 +135,15 @@ class Instruction:
 @dataclass(frozen=True, slots=True, eq=False)
 class PlainPlaces:
     """Where K motions that are alike are: starts (K,): offsets of the statements; from there are counted targets (K,):
-    the ends of their targets, stops (K,): their ends, literals, literal_stops (K, 7): those of x, y, z, q1..q4."""
+    the ends of their targets, stops (K,): their ends, literals, literal_stops (K, 7): those of x, y, z, q1..q4;
+    ``named``: these are in the declarations of the targets."""
 
     starts: NDArray[Any]
     targets: NDArray[Any]
     stops: NDArray[Any]
     literals: NDArray[Any]
     literal_stops: NDArray[Any]
+    named: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -293,7 +296,8 @@ class RapidRoutine:
 @dataclass(slots=True)
 class Module:
     """What a file declares.  ``records``: type -> (component, type); ``name_stop``: where the line of MODULE goes on,
-    -1 without one; ``unclear``: places between routines that are not understood."""
+    -1 without one; ``unclear``: places between routines that are not understood; ``targets``: name -> offset of a
+    declaration that is in no other list."""
 
     declarations: list[DataDeclaration] = field(default_factory=list)
     routines: list[RapidRoutine] = field(default_factory=list)
@@ -302,3 +306,4 @@ class Module:
     unclear: list[NotUnderstood] = field(default_factory=list)
     name_stop: int = -1
     unclosed: int = -1
+    targets: Mapping[bytes, int] = field(default_factory=dict)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from postproc.base.arrays import Bools, FewRows, Floats, Ints
 from postproc.base.decimals import literals
 from postproc.languages.rapid.motion_facts import is_direct, item_of
-from postproc.languages.rapid.plain_lines import other_literal
+from postproc.languages.rapid.plain_lines import each_number, other_literal
 from postproc.languages.rapid.syntax_tree import Aggregate, Argument, Index, Name, PlainPlaces
 from postproc.languages.rapid.values import Leaf, Value, numbers_of
 
@@ -22,6 +23,8 @@ NUMBERS = 7
 """Of a target that can be corrected: x, y, z and q1 to q4."""
 NOWHERE = ((-1, -1),) * NUMBERS
 _LIST = re.compile(rb"\[[^\[\]]*+\]")
+_LAST_NAME = re.compile(rb"[A-Za-z0-9_]++(?=[ \t]*+\Z)")
+_COMMENT = re.compile(rb"(\"[^\"\r\n]*+\")|![^\r\n]*+")
 _EDITABLE = re.compile(rb"[-+]?[ \t]*[0-9.]")
 
 
@@ -86,9 +89,12 @@ class MotionTexts:
         target, stop = start + int(run.targets[place]), start + int(run.stops[place])
         ends = zip(run.literals[place].tolist(), run.literal_stops[place].tolist(), strict=True)
         spots = tuple((start + one, start + other) for one, other in ends)
-        lists = _LIST.findall(raw, spots[-1][1] + 1, target)
-        words = b",".join(b" ".join(one.split()) for one in lists)
-        point = PointText(spots, (raw.index(b"[", start), target), words, b"", True)
+        if run.named:
+            point = _named_point(raw, spots, start, target)
+        else:
+            lists = _LIST.findall(raw, spots[-1][1] + 1, target)
+            words = b",".join(b" ".join(one.split()) for one in lists)
+            point = PointText(spots, (raw.index(b"[", start), target), words, b"", True)
         return replace(text, start=start, stop=stop, target=point)
 
     def uses(self, start: int) -> int:
@@ -150,6 +156,11 @@ class RapidSourceMap:
         return found
 
 
+def in_one_line(text: bytes) -> bytes:
+    """A part of a statement without its comments and line ends."""
+    return b" ".join(_COMMENT.sub(rb"\1", text).split())
+
+
 def target_numbers(value: Value) -> list[float]:
     """x, y, z, q1..q4 of a robtarget; NaN where one is not known."""
     return [number for number, _, _ in _leaves(value)]
@@ -190,6 +201,14 @@ def point_text(argument: Argument, value: Value, raw: bytes) -> PointText:
     return PointText(spots, (start, stop), _words(expression, value, raw), name, inline)
 
 
+def _named_point(raw: bytes, spots: tuple[tuple[int, int], ...], start: int, target: int) -> PointText:
+    """The point of a motion of a run to declared targets, between two bytes of the motion."""
+    rest = each_number(raw[spots[-1][1] : raw.index(b";", spots[-1][1])])
+    found = _LAST_NAME.search(raw, start, target)
+    operand = (target, target) if found is None else found.span()
+    return PointText(spots, operand, _listed(rest[:4], rest[4:]), raw[slice(*operand)].upper(), False)
+
+
 def _is_editable(raw: bytes, start: int, stop: int) -> bool:
     """Whether a literal is a number in a list, with nothing but blanks before it."""
     if start < 0 or not _EDITABLE.match(raw, start, stop):
@@ -204,11 +223,15 @@ def _words(expression: Any, value: Value, raw: bytes) -> bytes:
     """Configuration and external axes: as the aggregate has them, or as numbers."""
     if isinstance(expression, Aggregate) and len(expression.items) == 4:
         parts = expression.items[2:]
-        return b",".join(b" ".join(raw[part.start : part.stop].split()) for part in parts)
+        return b",".join(in_one_line(raw[part.start : part.stop]) for part in parts)
     conf, external = numbers_of(item_of(value, 2), 4), numbers_of(item_of(value, 3), 6)
     if conf is None or external is None:
         return b""
-    return b",".join(b"[" + b",".join(map(_spelt, part)) + b"]" for part in (conf, external))
+    return _listed(conf, external)
+
+
+def _listed(*parts: Iterable[float]) -> bytes:
+    return b",".join(b"[" + b",".join(map(_spelt, part)) + b"]" for part in parts)
 
 
 def _spelt(number: float) -> bytes:

@@ -7,18 +7,16 @@ from itertools import chain
 
 import numpy as np
 
-from postproc.base.arrays import Bools, Ints, differs
+from postproc.base.arrays import Ints
 from postproc.base.decimals import fixed, fixed_one
 from postproc.base.document import Edit, Edits, Span
 from postproc.base.findings import Finding
-from postproc.languages.dialect import EditedTargets, Plan, Program, Role, WritingSettings
+from postproc.languages.core.plan_rows import blocks
+from postproc.languages.dialect import EditedTargets, Plan, Program, WritingSettings
 from postproc.languages.rapid.inserted_lines import insertions
 from postproc.languages.rapid.plan_writer import PlanWriter, PointNumbers, aggregate
 from postproc.languages.rapid.target_places import MotionText, PointText
-from postproc.toolpath import Kind
 
-BLOCK = 1 << 14
-"""Motions that are written at a time."""
 HELP = "Give each motion its own point in numbers."
 _OPERAND = frozenset(b"0123456789 \t.,:+-*/'=#_$[]{}()\\ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz")
 
@@ -31,10 +29,6 @@ def edit_targets(program: Program, plan: Plan, writing: WritingSettings) -> Edit
     return _Writer(program, plan, writing).edited()
 
 
-def _blocks(rows: Ints) -> Iterator[Ints]:
-    return (rows[at : at + BLOCK] for at in range(0, len(rows), BLOCK))
-
-
 class _Writer:
     def __init__(self, program: Program, plan: Plan, writing: WritingSettings) -> None:
         self.task = PlanWriter(program, plan, writing)
@@ -42,48 +36,17 @@ class _Writer:
 
     def edited(self) -> EditedTargets:
         task = self.task
-        touched, way = self._touched()
-        self._refuse_forbidden(touched, way)
+        touched, way = task.touched()
         changed = np.flatnonzero(touched | way)
         plain = task.places.motions.is_plain(changed)
         edits = list(self._in_text(changed[~plain]))
-        numbers = (self._in_lines(part) for part in _blocks(changed[plain]))
+        numbers = (self._in_lines(part) for part in blocks(changed[plain]))
         inserted, unfit = insertions(task)
         for row, why in unfit.items():
             self.hold(row, why, "RAP012")
         if self.held:
             return EditedTargets((), self.held)
         return EditedTargets(Edits.collected(chain([edits, inserted], numbers)))
-
-    def _touched(self) -> tuple[Bools, Bools]:
-        """(N,) rows whose end is another one, and arcs whose path is."""
-        path, plan, own = self.task.path, self.task.plan, self.task.own
-        n = len(path)
-        touched, way = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
-        for at in range(0, n, BLOCK):
-            rows = np.arange(at, min(at + BLOCK, n))
-            there = own[rows]
-            touched[rows] = differs(plan.position[there], path.position[rows]).any(axis=1)
-            touched[rows] |= differs(plan.rotation[there], path.rotation[rows]).any(axis=(1, 2))
-        arcs = np.flatnonzero(path.kind == Kind.CIRC)
-        there = own[arcs]
-        way[arcs] = differs(plan.centre[there], path.arcs.centre[arcs]).any(axis=1)
-        way[arcs] |= differs(plan.normal[there], path.arcs.normal[arcs]).any(axis=1)
-        way[arcs] |= differs(plan.sweep[there], path.arcs.sweep[arcs])
-        return touched, way
-
-    def _refuse_forbidden(self, touched: Bools, way: Bools) -> None:
-        path, plan = self.task.path, self.task.plan
-        fixed = path.constraints
-        moved = {row for row in (*fixed.refused, *fixed.locked) if touched[row]}
-        moved |= {row for row in fixed.refused if way[row]}
-        moved |= set(np.flatnonzero(touched & (path.kind == Kind.AXIS)).tolist())
-        if moved:
-            raise ValueError(f"motions that cannot be corrected are moved: rows {sorted(moved)[:5]}")
-        divided = set(plan.source[plan.role != Role.ORIGINAL].tolist())
-        wrong = divided & {*fixed.refused, *fixed.no_insert_before}
-        if wrong:
-            raise ValueError(f"motions that cannot be divided are divided: rows {sorted(wrong)[:5]}")
 
     def _in_lines(self, rows: Ints) -> Edits:
         """Edits of the literals of ``rows`` (K,) of runs of common lines, each of one motion alone."""
@@ -101,7 +64,7 @@ class _Writer:
         task = self.task
         there = task.own[rows]
         said = task.places.numbers(rows)
-        wanted, vias = task.wanted(said, rows, there), task.vias(there)
+        wanted, vias = task.wanted(said, rows, there), task.middles(there)
         for k, row in enumerate(rows.tolist()):
             text = task.text(row)
             if text.target is None:

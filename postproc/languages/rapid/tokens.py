@@ -9,8 +9,8 @@ _TOKEN = re.compile(
     rb"(?P<number>(?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?+)(?![A-Za-z0-9_.])"
     rb"|(?P<name>[A-Za-z][A-Za-z0-9_]*+)"
     rb'|(?P<text>"(?:[^"\r\n]|"")*+")'
-    rb"|(?P<sign>:=|<>|<=|>=|[-+*/=<>,;:\\()\[\]{}.?])"
-    rb"|(?P<other>[^ \t\r\n\f!]++)",
+    rb"|(?P<sign>:=|<>|<=|>=|[-+*/=<>,;:\\()\[\]{}.?%])"
+    rb"|(?P<other>[^ \t\r\n\f!;]++)",
 )
 _BLANK = re.compile(rb"[ \t\r\n\f]++")
 _COMMENT = re.compile(rb"![^\r\n]*+")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from postproc.base.document import Document, Edit
 from postproc.base.findings import Finding, Refusal
+from postproc.languages.core.single_file import BEGIN, SingleFileDialect
 from postproc.languages.dialect import (
     MARK,
     PLAIN,
@@ -22,13 +23,11 @@ from postproc.languages.tp import codes as codes
 _PROGRAM = re.compile(rb"^(?:\xef\xbb\xbf)?[ \t]*+/PROG\b", re.I | re.M)
 _MAIN = re.compile(rb"^[ \t]*+/MN\b", re.I | re.M)
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,35}")
-BEGIN = 65536
-"""Bytes from the start of a file that are looked at."""
 LONGEST = 32
 """Letters of a comment (FANUC, operator's manual, remark instruction; recalled)."""
 
 
-class TpDialect:
+class TpDialect(SingleFileDialect):
     """TP as a ``Dialect``."""
 
     name = "tp"
@@ -40,14 +39,6 @@ class TpDialect:
         return _MAIN.search(start) is not None and (
             _PROGRAM.search(start) is not None or path.suffix.lower() == ".ls"
         )
-
-    def companions(self, path: Path) -> list[Path]:
-        return []
-
-    def siblings(
-        self, program: Program, settings: ReadingSettings, beside: Path | None = None
-    ) -> tuple[Document, ...]:
-        return ()
 
     def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
         from postproc.languages.tp import listing_reader  # takes its time to load

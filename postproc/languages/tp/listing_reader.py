@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from codecs import BOM_UTF8
+from functools import partial
 
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
 from postproc.base.memory import without_garbage_collection
+from postproc.languages.core.row_facts import not_understood, shown
 from postproc.languages.dialect import EditSyntax, Program, ReadingSettings
 from postproc.languages.tp.position_data import TpPosition, read_positions
 from postproc.languages.tp.statement_flow import StatementFlow
@@ -16,10 +18,7 @@ from postproc.languages.tp.tp_propagation import TpPropagation, TpState
 from postproc.languages.tp.tp_remarks import find_marker
 from postproc.languages.tp.tp_rows import RowBuilder, TpRows, read_points
 from postproc.languages.tp.tp_source_map import TpSourceMap
-from postproc.languages.tp.tp_toolpath import external_moves, row_finding, toolpath_of
-
-SHOWN = 20
-"""Statements that are not understood are reported one by one up to this number."""
+from postproc.languages.tp.tp_toolpath import row_finding, toolpath_of
 
 
 @without_garbage_collection()
@@ -38,7 +37,7 @@ def read(documents: tuple[Document, ...], settings: ReadingSettings) -> Program:
     path, runs, findings = toolpath_of(document, listing, run, rows)
     findings += _structure(document, listing, problem)
     findings += _statements(document, listing, run)
-    findings += [*_assumed(document, rows), *external_moves(document, rows)]
+    findings += _assumed(document, rows)
     places = TpSourceMap.of(listing, positions, rows, runs, read_points(flow.statements))
     at = max(listing.main, len(BOM_UTF8) if document.raw.startswith(BOM_UTF8) else 0)
     return Program(
@@ -91,22 +90,17 @@ def _structure(document: Document, listing: TpListing, problem: tuple[int, str] 
         found.append(_finding(document, "FTP007", problem[1], max(problem[0], 0)))
     span = listing.attributes.get(b"LINE_COUNT")
     if span is not None and listing.raw[span[0] : span[1]].strip() not in (b"0", b"%d" % listing.count):
-        message = f"LINE_COUNT is {_shown(listing.raw[span[0] : span[1]])}, and /MN has {listing.count} lines"
+        message = f"LINE_COUNT is {shown(listing.raw[span[0] : span[1]])}, and /MN has {listing.count} lines"
         found.append(_finding(document, "FTP019", message, span[0]))
     return found
 
 
 def _statements(document: Document, listing: TpListing, run: TpPropagation) -> list[Finding]:
     """Statements that are not understood, and calls."""
-    found = []
-    unread = sorted(run.unread)
-    for at in unread[:SHOWN]:
-        one = listing.statements[at]
-        found.append(_finding(document, "FTP001", f"{_shown(one.text)!r} is not understood", one.line_start))
-    if len(unread) > SHOWN:
-        one = listing.statements[unread[SHOWN]]
-        message = f"{len(unread) - SHOWN} further statements are not understood"
-        found.append(_finding(document, "FTP001", message, one.line_start))
+    unread = [listing.statements[at] for at in sorted(run.unread)]
+    found = not_understood(
+        [(one.text, one.line_start) for one in unread], partial(_finding, document, "FTP001")
+    )
     names: set[str] = set()
     for at, name in sorted(run.calls.items()):
         if name not in names:
@@ -123,10 +117,6 @@ def _assumed(document: Document, rows: TpRows) -> list[Finding]:
         message = f"{name}_NUM is not known here{more}; the frames of the points are taken"
         return [row_finding(document, rows, row, "FTP017", message)]
     return []
-
-
-def _shown(text: bytes) -> str:
-    return " ".join(text.decode("latin-1").split())[:60]
 
 
 def _finding(document: Document, code: str, message: str, at: int) -> Finding:

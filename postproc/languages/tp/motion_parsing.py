@@ -8,15 +8,17 @@ from dataclasses import dataclass
 from postproc.languages.tp.tp_statements import Operand, PointReference, RegisterOperand, TpMove
 
 _BLANK = re.compile(rb"[ \t]*+")
-_START = re.compile(rb"[ \t]*+([JLCAS])(?=[ \t]*+(?:P|PR|AR|R)[ \t]*+\[)", re.I)
-_POINT = re.compile(rb"[ \t]*+P[ \t]*+\[[ \t]*+([0-9]++)[ \t]*+(?::[^\]]*+)?+\]", re.I)
+_START = re.compile(rb"[ \t]*+(?![AS]R[ \t]*+\[)([JLCAS])(?=[ \t]*+(?:P|PR|AR|R)[ \t]*+\[)", re.I)
+_POINT = re.compile(rb"[ \t]*+P[ \t]*+\[[ \t]*+([0-9]{1,9}+)[ \t]*+(?::[^\]]*+)?+\]", re.I)
 _OTHER_POINT = re.compile(rb"[ \t]*+(PR|P|AR|R)[ \t]*+\[(?:[^\[\]]*+(?:\[[^\[\]]*+\])?+)*+\]", re.I)
 _UNIT = rb"((?:mm/sec|cm/min|inch/min|deg/sec|msec|sec|%)(?![A-Z0-9_.%/]))"
 _SPEED = re.compile(rb"[ \t]*+([0-9]++\.?+[0-9]*+|\.[0-9]++)[ \t]*+" + _UNIT, re.I)
-_REGISTER_SPEED = re.compile(rb"[ \t]*+(A?+R)\[[ \t]*+([0-9]++)[ \t]*+(?::[^\]]*+)?+\][ \t]*+" + _UNIT, re.I)
+_REGISTER_SPEED = re.compile(
+    rb"[ \t]*+(A?+R)\[[ \t]*+([0-9]{1,9}+)[ \t]*+(?::[^\]]*+)?+\][ \t]*+" + _UNIT, re.I
+)
 _NAMED_SPEED = re.compile(rb"[ \t]*+(WELD_SPEED|max_speed|DISP_SPEED)\b", re.I)
 _FINE = re.compile(rb"[ \t]*+FINE\b", re.I)
-_ROUND = re.compile(rb"[ \t]*+(CNT|CR)[ \t]*+([0-9]++)(?![A-Z0-9_.\[])", re.I)
+_ROUND = re.compile(rb"[ \t]*+(CNT|CR)[ \t]*+([0-9]{1,9}+)(?![A-Z0-9_.\[])", re.I)
 _REGISTER_ROUND = re.compile(rb"[ \t]*+(CNT|CR)[ \t]*+A?+R\[[^\]]*+\]", re.I)
 
 _REGISTER = rb"\[[^\[\]]*+\]"
@@ -48,7 +50,7 @@ _COORDINATED = re.compile(
     rb"[ \t]*+(COORD(?:" + _REGISTER + rb")?+|RTCP|MROT|(?:Ind\.)?+EVi?+[ \t]*+[0-9]++[ \t]*+%)", re.I
 )
 _SKIP = re.compile(
-    rb"[ \t]*+Skip[ \t]*+,[ \t]*+LBL\[[ \t]*+([0-9]++)[ \t]*+(?::[^\]]*+)?+\](?:[ \t]*+,[ \t]*+PR" + _REGISTER
+    rb"[ \t]*+Skip[ \t]*+,[ \t]*+LBL\[[ \t]*+([0-9]{1,9}+)[ \t]*+(?::[^\]]*+)?+\](?:[ \t]*+,[ \t]*+PR" + _REGISTER
     + rb"[ \t]*+=[ \t]*+[LJ]POS)?+",
     re.I,
 )  # fmt: skip
@@ -112,7 +114,7 @@ def _point(text: bytes, at: int, start: int) -> tuple[PointReference | None, int
     found = _POINT.match(text, at)
     if found is not None:
         first, last = found.span(1)
-        return PointReference(int(found[1][:9]), (start + first, start + last)), found.end()
+        return PointReference(int(found[1]), (start + first, start + last)), found.end()
     found = _OTHER_POINT.match(text, at)
     if found is None:
         return None, at
@@ -133,7 +135,7 @@ def _speed(text: bytes, at: int) -> tuple[Operand, bytes, int] | None:
     if found is not None:
         unit = found[3].lower()
         known = found[1].upper() == b"R" and unit == b"mm/sec"
-        return RegisterOperand(int(found[2][:9])) if known else None, unit, found.end()
+        return RegisterOperand(int(found[2])) if known else None, unit, found.end()
     found = _NAMED_SPEED.match(text, at)
     return None if found is None else (None, b"", found.end())
 
@@ -144,7 +146,7 @@ def _corner(text: bytes, at: int) -> tuple[bytes, float | None, int] | None:
         return b"FINE", 0.0, found.end()
     found = _ROUND.match(text, at)
     if found is not None:
-        return found[1].upper(), float(found[2][:9]), found.end()
+        return found[1].upper(), float(found[2]), found.end()
     found = _REGISTER_ROUND.match(text, at)
     return None if found is None else (found[1].upper(), None, found.end())
 
@@ -172,7 +174,7 @@ def _read_options(text: bytes, at: int, options: _Options) -> int:
                 f"it is coordinated with another motion group ({name})",
             )
         elif (found := _SKIP.match(text, after)) is not None:
-            options.skip = int(found[1][:9])
+            options.skip = int(found[1])
             options.problem = options.problem or ("FTP013", "it may end before its target (Skip)")
         else:
             return at

@@ -9,9 +9,10 @@ import numpy as np
 
 from postproc.base.document import Edit, Edits, Span
 from postproc.base.findings import Finding
+from postproc.languages.core.plan_rows import blocks
 from postproc.languages.dialect import EditedTargets, Plan, Program, Role, WritingSettings
 from postproc.languages.tp.position_data import TpPosition
-from postproc.languages.tp.tp_plan import CHUNK, NewPoints, SixNumbers, TpPlanNumbers
+from postproc.languages.tp.tp_plan import NewPoints, SixNumbers, TpPlanNumbers
 from postproc.languages.tp.tp_statements import TpMove
 from postproc.toolpath import Kind
 
@@ -37,7 +38,6 @@ class _PointWriter:
     def edited(self) -> EditedTargets:
         task = self.task
         touched, way = task.touched()
-        task.refuse_forbidden(touched, way)
         arcs = np.flatnonzero(np.isfinite(task.path.arcs.sweep))
         way[arcs] |= touched[arcs - 1]  # the tool is to turn evenly from the new start
         divided = np.flatnonzero(task.plan.role != Role.ORIGINAL)
@@ -64,8 +64,7 @@ class _PointWriter:
     def _in_text(self, rows: np.ndarray, rewritten: set[int]) -> Iterator[Edit]:
         """Edits of the points of ``rows`` (K,), and of the form of those that are ``rewritten``."""
         task = self.task
-        for at in range(0, len(rows), CHUNK):
-            part = rows[at : at + CHUNK]
+        for part in blocks(rows):
             there = task.own[part]
             wanted = task.wanted(part, there)
             arcs = np.isfinite(task.plan.sweep[there]) & (task.path.kind[part] == Kind.CIRC)
@@ -146,8 +145,7 @@ class _PointWriter:
         """Row -> texts of the motions before it, after their line numbers."""
         task = self.task
         lines: dict[int, list[bytes]] = {}
-        for at in range(0, len(motions), CHUNK):
-            part = motions[at : at + CHUNK]
+        for part in blocks(motions):
             rows = task.plan.source[part]
             wanted = task.wanted(rows, part)
             arcs = (task.plan.role[part] == Role.INTERMEDIATE) & (task.path.kind[rows] == Kind.CIRC)

@@ -6,11 +6,11 @@ import re
 from dataclasses import dataclass, field
 
 _HEAD = re.compile(
-    rb"\s*+P[ \t]*+\[[ \t]*+([0-9]++)[ \t]*+(:[ \t]*+(?:\"[^\"\r\n]*+\"|[^\]\"\r\n]*+))?+[ \t]*+\]\s*+\{",
+    rb"\s*+P[ \t]*+\[[ \t]*+([0-9]{1,9}+)[ \t]*+(:[ \t]*+(?:\"[^\"\r\n]*+\"|[^\]\"\r\n]*+))?+[ \t]*+\]\s*+\{",
     re.I,
 )
-_GROUP = re.compile(rb"\s*+GP[ \t]*+([0-9]++)[ \t]*+:", re.I)
-_FRAME = re.compile(rb"\s*+(UF|UT)[ \t]*+:[ \t]*+([0-9]++|F)\b", re.I)
+_GROUP = re.compile(rb"\s*+GP[ \t]*+([0-9]{1,9}+)[ \t]*+:", re.I)
+_FRAME = re.compile(rb"\s*+(UF|UT)[ \t]*+:[ \t]*+([0-9]{1,9}+|F)\b", re.I)
 _CONFIG = re.compile(rb"\s*+CONFIG[ \t]*+:[ \t]*+'([^'\r\n]*+)'", re.I)
 _NUMBER = rb"[-+]?+(?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?:E[-+]?+[0-9]++)?+"
 _VALUE = re.compile(
@@ -22,11 +22,21 @@ _END = re.compile(rb"\s*+\}\s*+;")
 _CLOSE = re.compile(rb"\}\s*+;")
 _NEXT = re.compile(rb"^[ \t]*+P[ \t]*+\[", re.M | re.I)
 _FLAGS = re.compile(
-    rb"\s*+([FN])\s*+([UD])\s*+([TB])\s*+,\s*+(-?[0-9]++)\s*+,\s*+(-?[0-9]++)\s*+,\s*+(-?[0-9]++)\s*+", re.I
+    rb"\s*+([FN])\s*+([UD])\s*+([TB])\s*+,\s*+(-?[0-9]{1,9}+)\s*+,\s*+(-?[0-9]{1,9}+)\s*+,\s*+(-?[0-9]{1,9}+)\s*+",
+    re.I,
 )
 CARTESIAN = (b"X", b"Y", b"Z", b"W", b"P", b"R")
 JOINTS = tuple(b"J%d" % axis for axis in range(1, 7))
 EXTERNAL = tuple(b"E%d" % axis for axis in range(1, 7))
+COMMON_POINT = re.compile(
+    rb"\s*+GP1:\s*+UF : ([0-9]{1,9}+), UT : ([0-9]{1,9}+),\s*+CONFIG : ('[^'\r\n]*+'),\s*+"
+    + rb",\s*+".join(
+        name + rb"[ \t]*+=[ \t]*+(" + _NUMBER + rb")[ \t]*+" + unit
+        for name, unit in zip(CARTESIAN, (b"mm",) * 3 + (b"deg",) * 3, strict=True)
+    )
+    + rb"\s*+\}\s*+;"
+)
+"""The braces of a point as controllers and posts write them, taken at once; the general rules give the same."""
 _UNITS = {
     **dict.fromkeys(CARTESIAN[:3], b"mm"),
     **dict.fromkeys(CARTESIAN[3:], b"deg"),
@@ -109,8 +119,13 @@ def read_positions(raw: bytes, start: int, stop: int) -> tuple[dict[int, TpPosit
 def _position(raw: bytes, head: re.Match[bytes], stop: int) -> TpPosition:
     start = head.start() + len(head[0]) - len(head[0].lstrip())
     comment = head.span(2) if head[2] is not None else (head.end(1), head.end(1))
-    one = TpPosition(int(head[1][:9]), start, head.end(), head.span(1), comment)
+    one = TpPosition(int(head[1]), start, head.end(), head.span(1), comment)
     at = head.end()
+    common = COMMON_POINT.match(raw, at, stop)
+    if common is not None:
+        one.stop = common.end()
+        one.groups.append(_common_group(common))
+        return one
     while True:
         end = _END.match(raw, at, stop)
         if end is not None:
@@ -130,11 +145,22 @@ def _position(raw: bytes, head: re.Match[bytes], stop: int) -> TpPosition:
         at = after if comma is None else comma.end()
 
 
+def _common_group(found: re.Match[bytes]) -> PositionGroup:
+    values = [float(text) for text in found.group(4, 5, 6, 7, 8, 9)]
+    return PositionGroup(
+        1,
+        {b"UF": int(found[1]), b"UT": int(found[2])},
+        found[3][1:-1],
+        dict(zip(CARTESIAN, values, strict=True)),
+        {name: found.span(place) for place, name in enumerate(CARTESIAN, 4)},
+    )
+
+
 def _item(raw: bytes, at: int, stop: int, one: TpPosition) -> int:
     """Where an item ends; -1 where there is none that is known, or it is there twice."""
     found = _GROUP.match(raw, at, stop)
     if found is not None:
-        number = int(found[1][:9])
+        number = int(found[1])
         if one.group(number) is not None:
             return -1
         one.groups.append(PositionGroup(number))
@@ -147,7 +173,7 @@ def _item(raw: bytes, at: int, stop: int, one: TpPosition) -> int:
         name = found[1].upper()
         if name in group.frames:
             return -1
-        group.frames[name] = None if found[2] in (b"F", b"f") else int(found[2][:9])
+        group.frames[name] = None if found[2] in (b"F", b"f") else int(found[2])
         return found.end()
     found = _CONFIG.match(raw, at, stop)
     if found is not None:
@@ -176,5 +202,5 @@ def configuration_flags(config: bytes) -> tuple[int, tuple[int, int, int]] | Non
     if found is None:
         return None
     flags = (found[3].upper() == b"B") * 4 + (found[2].upper() == b"D") * 2 + (found[1].upper() == b"F")
-    turns = tuple(int(found[k][:9]) for k in (4, 5, 6))
+    turns = tuple(int(found[k]) for k in (4, 5, 6))
     return flags, (turns[0], turns[1], turns[2])

@@ -33,20 +33,20 @@ from postproc.languages.tp.tp_statements import (
 )
 
 _REMARK = re.compile(rb"[ \t]*+(!|//|--[a-z]{2}:)")
-_LABEL = re.compile(rb"LBL[ \t]*+\[[ \t]*+([0-9]++)[ \t]*+(?::[^\]]*+)?+\]", re.I)
+_LABEL = re.compile(rb"LBL[ \t]*+\[[ \t]*+([0-9]{1,9}+)[ \t]*+(?::[^\]]*+)?+\]", re.I)
 _JUMP = re.compile(
-    rb"JMP[ \t]++LBL[ \t]*+\[[ \t]*+(?:([0-9]++)[ \t]*+(?::[^\]]*+)?+|[A-Z]++\[[^\]]*+\][ \t]*+)\]", re.I
+    rb"JMP[ \t]++LBL[ \t]*+\[[ \t]*+(?:([0-9]{1,9}+)[ \t]*+(?::[^\]]*+)?+|[A-Z]++\[[^\]]*+\][ \t]*+)\]", re.I
 )
 _CALL = re.compile(rb"(CALL|RUN)[ \t]++([A-Z_][A-Z0-9_\-]*+|SR\[[^\]]*+\])[ \t]*+(?:\(.*\))?+", re.I | re.S)
 _END = re.compile(rb"(?:END|ABORT)", re.I)
 _FRAME = re.compile(
-    rb"(UFRAME_NUM|UTOOL_NUM)[ \t]*+(?:\[[ \t]*+GP([0-9]++)[ \t]*+\])?+[ \t]*+=(.*)", re.I | re.S
+    rb"(UFRAME_NUM|UTOOL_NUM)[ \t]*+(?:\[[ \t]*+GP([0-9]{1,9}+)[ \t]*+\])?+[ \t]*+=(.*)", re.I | re.S
 )
 _ASSIGNED = re.compile(rb"(R|P|PR|UFRAME|UTOOL)[ \t]*+\[", re.I)
 _ASSIGNMENT = re.compile(
     rb"(R|P|PR|UFRAME|UTOOL)[ \t]*+\[((?:[^\[\]=]*+(?:\[[^\[\]]*+\])?+)*+)\][ \t]*+=(.*)", re.I | re.S
 )
-_INDEX = re.compile(rb"[ \t]*+(?:GP[0-9]++[ \t]*+:)?+[ \t]*+([0-9]++)[ \t]*+(?:[,:].*)?+", re.I | re.S)
+_INDEX = re.compile(rb"[ \t]*+(?:GP[0-9]++[ \t]*+:)?+[ \t]*+([0-9]{1,9}+)[ \t]*+(?:[,:].*)?+", re.I | re.S)
 _UNSIGNED = rb"(?:[0-9]++\.?+[0-9]*+|\.[0-9]++)"
 _OPERAND = (
     rb"(?:\([ \t]*+-?+[ \t]*+" + _UNSIGNED + rb"[ \t]*+\)|-?+[ \t]*+" + _UNSIGNED + rb"|R\[[^\[\]]*+\])"
@@ -54,7 +54,7 @@ _OPERAND = (
 _EXPRESSION = re.compile(
     rb"[ \t]*+(" + _OPERAND + rb")[ \t]*+(?:(\+|-|\*|/|DIV|MOD)[ \t]*+(" + _OPERAND + rb"))?+[ \t]*+", re.I
 )
-_ONE_REGISTER = re.compile(rb"R\[[ \t]*+([0-9]++)[ \t]*+(?::[^\]]*+)?+\]", re.I)
+_ONE_REGISTER = re.compile(rb"R\[[ \t]*+([0-9]{1,9}+)[ \t]*+(?::[^\]]*+)?+\]", re.I)
 _CONDITION = re.compile(
     rb"[ \t]*+\(?+[ \t]*+(R\[[^\[\]]*+\])[ \t]*+(=|<>|<=|>=|<|>)[ \t]*+("
     + _OPERAND
@@ -64,11 +64,17 @@ _CONDITION = re.compile(
 _IF = re.compile(rb"IF(?=[ \t(])(.*)", re.I | re.S)
 _THEN = re.compile(rb"(?:.*[ \t)])THEN", re.I | re.S)
 _CASE = re.compile(rb"(?:SELECT[ \t]++[^,]*+|=[^,]*+|ELSE[ \t]*+),(.*)", re.I | re.S)
-_FOR = re.compile(rb"FOR[ \t]++R\[[ \t]*+([0-9]++)[^\]]*+\][ \t]*+=.*[ \t](?:TO|DOWNTO)[ \t].*", re.I | re.S)
-_TIMEOUT = re.compile(rb"WAIT\b.*\bTIMEOUT[ \t]*+,[ \t]*+LBL[ \t]*+\[[ \t]*+([0-9]++)?+.*", re.I | re.S)
-_OVERRIDE = re.compile(rb"OVERRIDE[ \t]*+=[ \t]*+(?:([0-9]++)[ \t]*+%|A?+R\[[^\]]*+\](?:[ \t]*+%)?+)", re.I)
+_FOR = re.compile(
+    rb"FOR[ \t]++R\[[ \t]*+([0-9]{1,9}+)[^\]]*+\][ \t]*+=.*[ \t](?:TO|DOWNTO)[ \t].*", re.I | re.S
+)
+_TIMEOUT = re.compile(
+    rb"WAIT\b.*\bTIMEOUT[ \t]*+,[ \t]*+LBL[ \t]*+\[[ \t]*+(?:([0-9]{1,9}+)(?![0-9]))?+.*", re.I | re.S
+)
+_OVERRIDE = re.compile(
+    rb"OVERRIDE[ \t]*+=[ \t]*+(?:([0-9]{1,9}+)[ \t]*+%|A?+R\[[^\]]*+\](?:[ \t]*+%)?+)", re.I
+)
 _LIMIT = re.compile(rb"(?:JOINT|LINEAR)_MAX_SPEED\b.*", re.I | re.S)
-_POINT_READ = re.compile(rb"(?<![A-Z])P[ \t]*+\[[ \t]*+([0-9]++)?+", re.I)
+_POINT_READ = re.compile(rb"(?<![A-Z])P[ \t]*+\[[ \t]*+(?:([0-9]{1,9}+)(?![0-9]))?+", re.I)
 _PLACE = re.compile(rb"\b[LJC]POS\b", re.I)
 _STARTS = re.compile(
     rb"(Weave|Track|Touch[ \t]++Offset|Search[ \t]++Start|SOFTFLOAT|MIG[ \t]++EYE|LINE|FORCE[ \t]++CTRL)\b.*",
@@ -119,7 +125,7 @@ def _parse(text: bytes) -> TpStatement:
     if (found := _CASE.fullmatch(text)) is not None:
         return ConditionalStatement(None, _action(found[1]))
     if (found := _FOR.fullmatch(text)) is not None:
-        return LoopStart(int(found[1][:9]))
+        return LoopStart(int(found[1]))
     return _parse_settings(text)
 
 
@@ -132,9 +138,9 @@ def _parse_simple(text: bytes) -> TpStatement | None:
     if _END.fullmatch(text):
         return ProgramEnd()
     if (found := _LABEL.fullmatch(text)) is not None:
-        return LabelStatement(int(found[1][:9]))
+        return LabelStatement(int(found[1]))
     if (found := _JUMP.fullmatch(text)) is not None:
-        return JumpStatement(None if found[1] is None else int(found[1][:9]))
+        return JumpStatement(None if found[1] is None else int(found[1]))
     if (found := _CALL.fullmatch(text)) is not None:
         return ProgramCall(found[2].decode("latin-1"))
     if (found := _FRAME.fullmatch(text)) is not None:
@@ -148,9 +154,9 @@ def _parse_simple(text: bytes) -> TpStatement | None:
 
 def _parse_settings(text: bytes) -> TpStatement:
     if (found := _TIMEOUT.fullmatch(text)) is not None:
-        return TimeoutStatement(None if found[1] is None else int(found[1][:9]))
+        return TimeoutStatement(None if found[1] is None else int(found[1]))
     if (found := _OVERRIDE.fullmatch(text)) is not None:
-        return OverrideStatement(None if found[1] is None else float(found[1][:9]))
+        return OverrideStatement(None if found[1] is None else float(found[1]))
     if _LIMIT.fullmatch(text):
         return OverrideStatement(None)
     if (found := _STOPS.fullmatch(text)) is not None:
@@ -196,10 +202,10 @@ def _assignment(text: bytes) -> TpStatement:
         return StatementNotRead()
     word, value = found[1].upper(), found[3]
     index = _INDEX.fullmatch(found[2])
-    number = None if index is None else int(index[1][:9])
+    number = None if index is None else int(index[1])
     if word == b"R" and number is not None and not _POINT_READ.search(value):
         return RegisterAssignment(number, _expression(value))
-    read = tuple(None if one[1] is None else int(one[1][:9]) for one in _POINT_READ.finditer(value))
+    read = tuple(None if one[1] is None else int(one[1]) for one in _POINT_READ.finditer(value))
     known = -1 if number is None else number
     return PositionUse(
         assigned=(number,) if word == b"P" else (),
@@ -223,7 +229,7 @@ def _expression(text: bytes) -> RegisterExpression:
 def _operand(text: bytes) -> Operand:
     register = _ONE_REGISTER.fullmatch(text)
     if register is not None:
-        return RegisterOperand(int(register[1][:9]))
+        return RegisterOperand(int(register[1]))
     if b"[" in text:
         return None
     return float(b"".join(text.strip(b"() \t").split()))

@@ -17,6 +17,8 @@ ROUND = 0.02 * MM
 EVEN = 0.1 * DEG
 """[rad] The orientation at an auxiliary point may be off the even turn from start to end by this; what the controller
 makes of another one is not known."""
+WIDEST = 170 * DEG
+"""[rad] Turn of the tool on an arc: near half a turn, its sense is not known."""
 
 
 def arc_runs(rows: TpRows) -> list[list[int]]:
@@ -101,6 +103,11 @@ def _check_turn(rows: TpRows, row: int, start: int, rotation: Floats) -> None:
     via = rotation_from_abc(rows.vias[row, 5:2:-1] * DEG)
     turn = turn_between(rotation[[start]], rotation[[row]])[0]
     total = float(turn @ turn)
+    if total > WIDEST**2:
+        rows.refuse(
+            row, "FTP012", "the tool turns by about half a turn on it, and in which sense is not known"
+        )
+        return
     share = 0.0 if total < 1e-18 else float(turn_between(rotation[[start]], via[None])[0] @ turn) / total
     even = rotation_from_vector(min(max(share, 0.0), 1.0) * turn) @ rotation[start]
     off = float(np.linalg.norm(turn_between(even[None], via[None])))

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import re
-from typing import NamedTuple
-
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
+from postproc.languages.core.row_facts import SPEAKS, PlacedRemarks
 from postproc.languages.dialect import MARK
 from postproc.languages.tp.tp_listing import TpListing
 from postproc.languages.tp.tp_propagation import TpPropagation
@@ -14,17 +12,10 @@ from postproc.languages.tp.tp_rows import TpRows
 from postproc.languages.tp.tp_statements import TpMove, TpRemark
 from postproc.toolpath import Annotation
 
-_SPEAKS = re.compile(r"(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
-
-
-class TpRemarks(NamedTuple):
-    annotations: tuple[Annotation, ...]
-    comments: tuple[Annotation, ...]
-
 
 def annotate(
     document: Document, listing: TpListing, run: TpPropagation, rows: TpRows
-) -> tuple[TpRemarks, list[Finding]]:
+) -> tuple[PlacedRemarks, list[Finding]]:
     """The comments at the rows before which they are.
 
     A motion that runs with another FORCE or COMPENSATE comment than the last one in the text above it gets that comment
@@ -38,7 +29,7 @@ def annotate(
     for at, one in enumerate(run.flow.statements):
         if isinstance(one, TpRemark):
             line = listing.statements[at].line
-            word = _SPEAKS.match(one.text)
+            word = SPEAKS.match(one.text)
             if word is None:
                 if one.text and not one.text.startswith(MARK):
                     comments.append(Annotation(row, one.text, line))
@@ -52,7 +43,7 @@ def annotate(
             row = rows.row_of[at]
             annotations += _repeated(rows, row, shown, document) if isinstance(one, TpMove) else []
             row += 1
-    return TpRemarks(tuple(annotations), tuple(comments)), findings
+    return PlacedRemarks(tuple(annotations), tuple(comments)), findings
 
 
 def _repeated(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.base.geometry import rotation_from_abc
 from postproc.base.units import DEG, MM
+from postproc.languages.core.row_facts import OTHER_PATHS, follow_on, grouped, moving_external, only_used
 from postproc.languages.tp.tp_arcs import arcs_of
 from postproc.languages.tp.tp_listing import TpListing
 from postproc.languages.tp.tp_propagation import TpPropagation
@@ -25,8 +25,6 @@ from postproc.toolpath import (
     Toolpath,
 )
 
-OTHER_PATHS = "several paths of the program lead to it or from the motion before it"
-
 
 def toolpath_of(
     document: Document, listing: TpListing, run: TpPropagation, rows: TpRows
@@ -38,7 +36,7 @@ def toolpath_of(
     rotation = rotation_from_abc(rows.numbers[:, 5:2:-1] * DEG) if n else np.empty((0, 3, 3))
     kinds = np.array(rows.kinds, np.int8)
     arcs, runs = arcs_of(rows, position, rotation, kinds)
-    continues = _continues(rows.before)
+    continues = follow_on(np.zeros(n, np.bool_), range(n), rows.before)
     refused = {row: row_finding(document, rows, row, *rows.problems[row]) for row in sorted(rows.problems)}
     wrist = np.array([move is not None and move.wrist for move in rows.moves], np.bool_)
     path = Toolpath(
@@ -77,22 +75,15 @@ def toolpath_of(
         annotations=remarks.annotations,
         comments=remarks.comments,
     )
-    findings += _grouped(rows, refused)
-    return _only_used(path), runs, findings
+    findings += grouped(refused, path.line)
+    moving = moving_external(rows.external)
+    if moving is not None:
+        findings.append(row_finding(document, rows, moving[0], "FTP022", moving[1]))
+    return only_used(path), runs, findings
 
 
 def row_finding(document: Document, rows: TpRows, row: int, code: str, message: str) -> Finding:
     return Finding(code, message, str(document.path), rows.lines[row], rows.columns[row])
-
-
-def _continues(before: list[tuple[int, ...]]) -> Bools:
-    """(N,) each motion surely starts where the row before it ends, and no other motion starts there."""
-    followers: dict[int, int] = {}
-    for places in before:
-        for one in places:
-            followers[one] = followers.get(one, 0) + 1
-    found = [places == (row - 1,) and followers[row - 1] == 1 for row, places in enumerate(before)]
-    return np.array(found, np.bool_)
 
 
 def _not_before(rows: TpRows, continues: Bools, refused: Mapping[int, Finding]) -> dict[int, str]:
@@ -152,44 +143,3 @@ def _locked(
                 message = f"line {listing.statements[at].line} reads the end position of this motion"
                 lock(rows.row_of[place], "FTP002", message)
     return dict(sorted(locked.items()))
-
-
-def _only_used(path: Toolpath) -> Toolpath:
-    """Without the frames that no motion has: nobody needs to know their pose."""
-    used = np.unique(np.concatenate([path.base, path.tool]))
-    used = used[used >= 0]
-    new = np.full(len(path.frames) + 1, -1, np.int32)
-    new[used] = np.arange(len(used))
-    frames = tuple(path.frames[i] for i in used.tolist())
-    return replace(path, base=new[path.base], tool=new[path.tool], frames=frames)
-
-
-def _grouped(rows: TpRows, refused: Mapping[int, Finding]) -> list[Finding]:
-    """The refusals, those of one code and cause as one finding."""
-    groups: dict[tuple[str, str], list[int]] = {}
-    for row, finding in refused.items():
-        groups.setdefault((finding.code, finding.message), []).append(row)
-    found = []
-    for chosen in groups.values():
-        first = refused[chosen[0]]
-        if len(chosen) > 1:
-            lines = [rows.lines[row] for row in chosen]
-            message = f"{first.message}; {len(chosen)} motions, lines {min(lines)} to {max(lines)}"
-            first = replace(first, message=message)
-        found.append(first)
-    return found
-
-
-def external_moves(document: Document, rows: TpRows) -> list[Finding]:
-    """External axes that do not stay where they are first."""
-    moving = []
-    for axis in range(6):
-        values = rows.external[:, axis]
-        stated = values[~np.isnan(values)]
-        if len(stated) and (not np.isfinite(stated).all() or (stated != stated[0]).any()):
-            moving.append((int(np.argmax(~np.isnan(values) & (values != stated[0]))), f"E{axis + 1}"))
-    if not moving:
-        return []
-    verb = "moves" if len(moving) == 1 else "move"
-    message = f"{', '.join(name for _, name in moving)} {verb}; the cell must state what external axes carry"
-    return [row_finding(document, rows, min(moving)[0], "FTP022", message)]

@@ -1,0 +1,99 @@
+"""What a family says of the rows of a program beside their targets: where they start, and why some stay as they are."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from itertools import chain
+from typing import NamedTuple
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.findings import Finding
+from postproc.toolpath import Annotation, Toolpath
+
+OTHER_PATHS = "several paths of the program lead to it or from the motion before it"
+SHOWN = 20
+"""Statements that are not understood are reported one by one up to this number."""
+SPEAKS = re.compile(r"(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
+"""What a comment starts with that speaks to this tool."""
+
+
+class PlacedRemarks(NamedTuple):
+    """Comments at the rows before which they are: those that speak to this tool, and others."""
+
+    annotations: tuple[Annotation, ...]
+    comments: tuple[Annotation, ...]
+
+
+def follow_on(joined: Bools, rows: Sequence[int], before: Sequence[tuple[int, ...]]) -> Bools:
+    """(N,) each motion surely starts where the row before it ends, and no other motion starts there.
+
+    ``rows``: those of which ``before`` says after which rows they run; of any other one ``joined`` (N,) says it.
+    """
+    found = joined.copy()
+    followers = Counter(chain.from_iterable(before))
+    for row, places in zip(rows, before, strict=True):
+        found[row] = places == (row - 1,) and followers[row - 1] == 1
+    return found
+
+
+def only_used(path: Toolpath) -> Toolpath:
+    """Without the frames that no motion has: nobody needs to know their pose."""
+    used = np.unique(np.concatenate([path.base, path.tool]))
+    used = used[used >= 0]
+    new = np.full(len(path.frames) + 1, -1, np.int32)
+    new[used] = np.arange(len(used))
+    return replace(
+        path, base=new[path.base], tool=new[path.tool], frames=tuple(path.frames[i] for i in used.tolist())
+    )
+
+
+def grouped(refused: Mapping[int, Finding], lines: Ints) -> list[Finding]:
+    """The refusals of rows, those of one code and cause as one finding; lines (N,): of all rows."""
+    groups: dict[tuple[str, str], list[int]] = {}
+    for row, finding in refused.items():
+        groups.setdefault((finding.code, finding.message), []).append(row)
+    found = []
+    for chosen in groups.values():
+        first = refused[chosen[0]]
+        if len(chosen) > 1:
+            these = lines[chosen]
+            message = f"{first.message}; {len(chosen)} motions, lines {these.min()} to {these.max()}"
+            first = replace(first, message=message)
+        found.append(first)
+    return found
+
+
+def moving_external(external: Floats) -> tuple[int, str] | None:
+    """The first row at which an external axis is not where it was first, and what is said there; external (N, 6)."""
+    moving = []
+    for axis in range(6):
+        values = external[:, axis]
+        stated = values[~np.isnan(values)]
+        if len(stated) and (not np.isfinite(stated).all() or (stated != stated[0]).any()):
+            moving.append((int(np.argmax(~np.isnan(values) & (values != stated[0]))), f"E{axis + 1}"))
+    if not moving:
+        return None
+    verb = "moves" if len(moving) == 1 else "move"
+    names = ", ".join(name for _, name in moving)
+    return min(moving)[0], f"{names} {verb}; the cell must state what external axes carry"
+
+
+def not_understood(
+    texts: Sequence[tuple[bytes, int]], finding: Callable[[str, int], Finding]
+) -> list[Finding]:
+    """Statements, each with the byte where it starts, that are not understood: some one by one, then their number."""
+    found = [finding(f"{shown(text)!r} is not understood", at) for text, at in texts[:SHOWN]]
+    if len(texts) > SHOWN:
+        message = f"{len(texts) - SHOWN} further statements are not understood"
+        found.append(finding(message, texts[SHOWN][1]))
+    return found
+
+
+def shown(text: bytes) -> str:
+    """The begin of a statement as messages have it."""
+    return " ".join(text.decode("latin-1").split())[:60]
