@@ -63,7 +63,7 @@ def _started(ready: Prepared, written: WrittenProgram) -> list[Finding]:
     """Cutting motions before which paths of the program meet or part: nothing leads to their corrected start."""
     path = ready.task.toolpath
     on_a_path = np.isin(path.kind, (Kind.LIN, Kind.CIRC)) & written.result.corrected & ready.task.carries
-    rows = np.flatnonzero(on_a_path & ~path.continues)
+    rows = np.flatnonzero(on_a_path & path.paths_meet)
     rows = rows[rows > 0]
     if not len(rows):
         return []

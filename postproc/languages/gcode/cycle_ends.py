@@ -16,19 +16,22 @@ from postproc.languages.gcode.words import How, key
 @dataclass(frozen=True, eq=False)
 class CycleEnds:
     """level (B,) [m]: the coordinate of the working axis after the cycle of a block, NaN where it is not known;
-    inherited (B,): it is that of the motion before the cycles; axis (B,): 0, 1, 2 for X, Y, Z."""
+    inherited (B,): it is that of the motion before the cycles, in block ``source`` (B,); axis (B,): 0, 1, 2 for X, Y,
+    Z."""
 
     level: Floats
     inherited: Bools
     axis: Ints
+    source: Ints
 
     def stated(self, sets: Bools, blocks: Ints) -> Bools:
         """(N, 3) the coordinates that ``blocks`` (N,) state, of those that they set (N, 3)."""
         return np.asarray(sets & ~(self.inherited[blocks, None] & (self.axis[blocks, None] == np.arange(3))))
 
 
-def _leaves_unknown(given: BlockWords, lengths: Bools) -> Bools:
-    """(B,) blocks before or after which the place of the tool may be another one than the last coordinates."""
+def leaves_unknown(given: BlockWords, lengths: Bools) -> Bools:
+    """(B,) blocks before or after which the place of the tool may be another one than the last coordinates; lengths
+    (B,): those in which another tool length holds than before."""
     modal = given.modal
     once = (Once.HOME, Once.MACHINE, Once.PROBE, Once.CALL, Once.OTHER, Once.STORE)
     others = (
@@ -40,10 +43,10 @@ def _leaves_unknown(given: BlockWords, lengths: Bools) -> Bools:
 
 def _named_ends(given: BlockWords, retract: int) -> CycleEnds:
     """Of a control whose cycles are called by name: their planes are coordinates."""
-    n, column = len(given), given.words(retract)
+    n, column, none = len(given), given.words(retract), everywhere(-1, len(given))
     axis = np.array([2, 1, 0])[np.clip(given.modal.force[Group.PLANE], 0, 2)]
     if not len(column):
-        return CycleEnds(everywhere(np.nan, n), everywhere(False, n), axis)
+        return CycleEnds(everywhere(np.nan, n), everywhere(False, n), axis, none)
     # Of the latest call; uncertain ones, and a change of units after them, leave it unknown.
     sure = given.modal.flow.reason[column.block] == 0
     values = np.where(sure, column.value, np.nan)
@@ -51,7 +54,15 @@ def _named_ends(given: BlockWords, retract: int) -> CycleEnds:
     block = np.append(column.block, 0)[at]
     level = np.where(at >= 0, np.append(values, np.nan)[at], np.nan) * given.length
     level = np.where(given.length[block] == given.length, level, np.nan)
-    return CycleEnds(level, everywhere(False, n), axis)
+    return CycleEnds(level, everywhere(False, n), axis, none)
+
+
+def _level_from(given: BlockWords, row: int, cycle: Bools, source: Ints) -> int:
+    """The motion whose end is the level to which the cycle ``row`` goes back."""
+    before = row - 1
+    while before >= 0 and not given.motion[before]:
+        before -= 1
+    return int(source[before]) if before >= 0 and cycle[before] else before
 
 
 def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
@@ -67,7 +78,7 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
     cycle = given.motion & (given.move == Move.CYCLE)
     rows = np.flatnonzero(cycle)
     if not len(rows):
-        return CycleEnds(everywhere(np.nan, n), everywhere(False, n), everywhere(2, n))
+        return CycleEnds(everywhere(np.nan, n), everywhere(False, n), everywhere(2, n), everywhere(-1, n))
     level = np.full(n, np.nan)
     axis = np.array([2, 1, 0])[np.clip(given.modal.force[Group.PLANE], 0, 2)]
     absolute = given.modal.force[Group.DISTANCE] == 0
@@ -82,15 +93,15 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
     placed &= ~(cycle[:, None] & (axis[:, None] == np.arange(3)))
     latest = np.maximum.accumulate(np.where(placed, np.arange(n)[:, None], -1), axis=0)
     frame = np.searchsorted(events, np.arange(n))
-    lost = np.cumsum(_leaves_unknown(given, lengths))
+    lost = np.cumsum(leaves_unknown(given, lengths))
     at_r, before, last = np.nan, np.nan, -1
-    inherited = np.zeros(n, np.bool_)
+    inherited, source, origin = np.zeros(n, np.bool_), np.full(n, -1), -1
     drilled = [-1, -1, -1]  # the latest cycle of each axis
     for row in rows.tolist():
         if last < 0 or given.move[row - 1] != Move.CYCLE or axis[row] != axis[row - 1]:
             at, drill = latest[row, axis[row]], drilled[axis[row]]
             there = level[drill] if drill > at else height[at, axis[row]]
-            at = max(at, drill)
+            at, origin = max(at, drill), _level_from(given, row, cycle, source)
             same = at >= 0 and frame[at] == frame[row] and lost[at] == lost[row]
             at_r, before = np.nan, there if same else np.nan
         elif frame[row] != frame[last]:
@@ -103,7 +114,7 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
         if back[row] == 1:
             level[row] = at_r
         elif back[row] == 0 and before >= at_r:
-            level[row], inherited[row] = before, True
+            level[row], inherited[row], source[row] = before, True, origin
         if not inherited[row]:  # which motion a G98 after it would build on is not followed
             before = np.nan
-    return CycleEnds(level, inherited, axis)
+    return CycleEnds(level, inherited, axis, source)
