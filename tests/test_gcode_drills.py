@@ -229,7 +229,8 @@ def test_the_main_job_moves_holes(compensate, job) -> None:
 
 def test_a_cut_behind_a_hole_is_told(compensate, job) -> None:
     job.cell(CELL + "orientation: {a: 0, b: 0, c: 180}\n")
-    lines = ["G21 G90 G17 G54", "T1 M6", "G0 X0. Y0. Z50.", "(FORCE 100 0 200 @BASE)", "G99 G81 X20. Y10. Z-5. R2. F300",
+    lines = ["G21 G90 G17 G54", "T1 M6", "G0 X0. Y0. Z50.", "(FORCE 100 0 200 @BASE)",
+             "G99 G81 X20. Y10. Z-5. R2. F300",
              "G80 G1 X120.", "(FORCE OFF)", "G0 Z50.", "M30"]  # fmt: skip
     done = compensate(job.write(lines, "\n", "part.ngc"), "--force", "--dry-run", "--json", "-")
     assert done.json["corrected"] == 2, done.out + done.err

@@ -94,19 +94,28 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
     latest = np.maximum.accumulate(np.where(placed, np.arange(n)[:, None], -1), axis=0)
     frame = np.searchsorted(events, np.arange(n))
     lost = np.cumsum(leaves_unknown(given, lengths))
+    # A cycle that says nothing of R, G98, G99 and the frame ends as the one before it.
+    says = has_plane[rows] | ~absolute[rows] | (given.move[rows - 1] != Move.CYCLE)
+    for state in (axis, frame, back):
+        says[1:] |= state[rows[1:]] != state[rows[:-1]]
+    says[0] = True
+    heads = np.flatnonzero(says)
     at_r, before, last = np.nan, np.nan, -1
     inherited, source, origin = np.zeros(n, np.bool_), np.full(n, -1), -1
     drilled = [-1, -1, -1]  # the latest cycle of each axis
-    for row in rows.tolist():
-        if last < 0 or given.move[row - 1] != Move.CYCLE or axis[row] != axis[row - 1]:
+    for row, tail in zip(
+        rows[heads].tolist(), rows[np.append(heads[1:], len(rows)) - 1].tolist(), strict=True
+    ):
+        if last < 0 or given.move[row - 1] != Move.CYCLE:
             at, drill = latest[row, axis[row]], drilled[axis[row]]
             there = level[drill] if drill > at else height[at, axis[row]]
             at, origin = max(at, drill), _level_from(given, row, cycle, source)
             same = at >= 0 and frame[at] == frame[row] and lost[at] == lost[row]
             at_r, before = np.nan, there if same else np.nan
-        elif frame[row] != frame[last]:
+        elif frame[row] != frame[last] or axis[row] != axis[last]:
+            # LinuxCNC goes back to the number of the other axis
             at_r, before = np.nan, np.nan
-        last = drilled[axis[row]] = row
+        last = drilled[axis[row]] = tail
         if has_plane[row]:  # one that is computed is not known
             at_r = plane[row] if absolute[row] and certain[row] else np.nan
         elif not absolute[row]:
@@ -117,4 +126,9 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
             level[row], inherited[row], source[row] = before, True, origin
         if not inherited[row]:  # which motion a G98 after it would build on is not followed
             before = np.nan
+        for column in (level, inherited, source):
+            column[tail] = column[row]
+    like = rows[np.maximum.accumulate(np.where(says, np.arange(len(rows)), 0))]
+    for column in (level, inherited, source):
+        column[rows] = column[like]
     return CycleEnds(level, inherited, axis, source)
