@@ -76,6 +76,11 @@ def test_the_level_to_which_g98_goes_back_stays() -> None:
     assert not path.constraints.locked
 
 
+def test_a_level_that_a_correction_would_lift_above_r_stays() -> None:
+    path = read(LINUX, HEAD + "G0 Z1.9\nG98 G81 X10 Y10 Z-5 R2 F100\nG80 G0 X50\nM2\n").toolpath
+    assert [*path.constraints.locked][:1] == [1]
+
+
 @pytest.mark.parametrize(
     ("text", "reason"),
     [

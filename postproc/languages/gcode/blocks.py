@@ -352,6 +352,7 @@ def frame_events(
         value = np.where(at_level[:, None] & deep, ends[:, None], value)
         repeats = given.has(key("L")) | given.has(key("K"))
         lose(deep, cycle & ~at_level, What.CYCLE)
+        lose(linear, cycle & (force[Group.PLANE] < 0), What.CYCLE)
         lose(whole, cycle & repeats & (force[Group.DISTANCE] != 0), What.CYCLE)
     lose(present, given.motion & (flow.reason != FlowReason.NONE), What.UNCERTAIN)
     lose(whole, given.noted("unknown"), What.TEXT)

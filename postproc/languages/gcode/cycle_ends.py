@@ -16,8 +16,8 @@ from postproc.languages.gcode.words import How, key
 @dataclass(frozen=True, eq=False)
 class CycleEnds:
     """level (B,) [m]: the coordinate of the working axis after the cycle of a block, NaN where it is not known;
-    inherited (B,): it is that of the motion before the cycles, in block ``source`` (B,); axis (B,): 0, 1, 2 for X, Y,
-    Z."""
+    inherited (B,): it is that of the motion before the cycles; axis (B,): 0, 1, 2 for X, Y, Z; source (B,): the block
+    of that motion, where it may decide on the level, else -1."""
 
     level: Floats
     inherited: Bools
@@ -91,12 +91,16 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
     sure = given.motion & ~given.machine & absolute & certain
     placed = sure[:, None] & np.isin(hows, (How.NUMBER, How.INTEGER))
     placed &= ~(cycle[:, None] & (axis[:, None] == np.arange(3)))
-    latest = np.maximum.accumulate(np.where(placed, np.arange(n)[:, None], -1), axis=0)
     frame = np.searchsorted(events, np.arange(n))
-    lost = np.cumsum(leaves_unknown(given, lengths))
+    # Of a cycle in a plane that is not known, neither is along which axis it works.
+    anywhere = cycle & (given.modal.force[Group.PLANE] < 0)
+    placed &= ~anywhere[:, None]
+    latest = np.maximum.accumulate(np.where(placed, np.arange(n)[:, None], -1), axis=0)
+    doubts = np.cumsum(anywhere)
+    lost = np.cumsum(leaves_unknown(given, lengths) | anywhere)
     # A cycle that says nothing of R, G98, G99 and the frame ends as the one before it.
     says = has_plane[rows] | ~absolute[rows] | (given.move[rows - 1] != Move.CYCLE)
-    for state in (axis, frame, back):
+    for state in (axis, frame, back, doubts):
         says[1:] |= state[rows[1:]] != state[rows[:-1]]
     says[0] = True
     heads = np.flatnonzero(says)
@@ -112,7 +116,7 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
             at, origin = max(at, drill), _level_from(given, row, cycle, source)
             same = at >= 0 and frame[at] == frame[row] and lost[at] == lost[row]
             at_r, before = np.nan, there if same else np.nan
-        elif frame[row] != frame[last] or axis[row] != axis[last]:
+        elif frame[row] != frame[last] or axis[row] != axis[last] or doubts[row] != doubts[last]:
             # LinuxCNC goes back to the number of the other axis
             at_r, before = np.nan, np.nan
         last = drilled[axis[row]] = tail
@@ -123,7 +127,9 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
         if back[row] == 1:
             level[row] = at_r
         elif back[row] == 0 and before >= at_r:
-            level[row], inherited[row], source[row] = before, True, origin
+            level[row], inherited[row] = before, True
+        if back[row] != 1:
+            source[row] = origin
         if not inherited[row]:  # which motion a G98 after it would build on is not followed
             before = np.nan
         for column in (level, inherited, source):
@@ -131,4 +137,5 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
     like = rows[np.maximum.accumulate(np.where(says, np.arange(len(rows)), 0))]
     for column in (level, inherited, source):
         column[rows] = column[like]
+    level[anywhere], inherited[anywhere] = np.nan, False
     return CycleEnds(level, inherited, axis, source)

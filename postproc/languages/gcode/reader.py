@@ -295,7 +295,7 @@ def _followed(
         np.array([frame.turn for frame in trace.frames]),
         np.array([frame.shift[:3] for frame in trace.frames]),
     )
-    levels = np.unique(ends.source[np.isfinite(drills.depth) & ends.inherited])
+    levels = np.unique(ends.source[np.isfinite(drills.depth) & (ends.source >= 0)])
     return FollowedMotions(found, built, frames, tuple(stands.orientations), collector, differing, levels)
 
 
