@@ -148,6 +148,8 @@ GCODE_LINES = (
     "G43 H%d\n", "IF [1]\n",
     "WHILE [#1 LT 9] DO1\n", "END1\n", "DEF REAL A%d\n", "SUPA G0 X1\n", "O; \r", "O0; ", "G28 X\n",
     "O%d\n", "PROC A%d\n",
+    "G98 G81 X%d Y1 Z1 R2\n", "G81 X1 Z1 R2\nX1\nG80\n", "G81 X1 Z1 R2\nX%d\nX1\nX2\nX3\nX4\n",
+    "G98 G18 G81 X1 Y1 R2\nG17\n", "G98 G81 X1 Z1 R2\nM8\nM9\n", "G98 G83 X1 Z1 R2 Q1\nG92 X1\n", "X%d U1\n",
 )  # fmt: skip
 CONTROLS = {
     "linuxcnc": "G21 G90 G17 G54\nG1 X1 F100\n",

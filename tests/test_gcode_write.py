@@ -306,7 +306,7 @@ def test_arcs_that_no_numbers_state_are_held() -> None:
     assert held("G1 X10 F50\nG3 X0 Y10 I-10 J0\n", short) == {2: "GCW001"}
 
 
-@pytest.mark.parametrize("text", ["G1 X1 F1\nG28 Z0\n", "G41 D1 G1 X1 Y1 F1\n", "G1 X1 F1\nG81 Z-1 R1\n"])
+@pytest.mark.parametrize("text", ["G1 X1 F1\nG28 Z0\n", "G41 D1 G1 X1 Y1 F1\n", "G1 X1 F1\nG81 Z-1 R1 L2\n"])
 def test_what_may_not_move_is_not_moved(text: str) -> None:
     program = read(LINUXCNC, HEAD + text)
     path = program.toolpath

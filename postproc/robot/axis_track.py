@@ -214,7 +214,7 @@ def _branches(
     value[1:][stated] = branch[stated] & 7
     value[1:][home] = value[0]
     sets = np.concatenate([[True], on_axes | stated | lost])
-    meets = np.flatnonzero(~toolpath.continues & ~sets[1:])
+    meets = np.flatnonzero(toolpath.paths_meet & ~sets[1:])
     sets[meets + 1] = True
     source = np.maximum.accumulate(np.where(sets, np.arange(len(sets)), 0))
     _join_branches(value, source, meets, toolpath.predecessors, isinstance(robot.nominal, SerialArm))
@@ -280,7 +280,7 @@ def _settle(
     turn = np.where(rows >= 0, toolpath.configuration["turn"][rows], -1)
     stated = (turn >= 0) & (np.where(rows >= 0, toolpath.kind[rows], -1) == Kind.PTP)
     reset = given | stated
-    reset |= ~toolpath.continues[np.maximum(rows, 0)]  # several motions may precede it
+    reset |= toolpath.paths_meet[np.maximum(rows, 0)]  # several motions may precede it
     reset[0] = True
     last = np.maximum.accumulate(np.where(reset, order, 0))
     large = _large(robot, values, rows, reset, status, toolpath, base, tool)

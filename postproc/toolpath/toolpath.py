@@ -89,6 +89,9 @@ class Toolpath(MotionColumns):
     there; the first one starts where the program does.  False where paths of the program meet or part, and for motions
     that never run: where such a motion starts is not known.
 
+    ``drills`` (N,): the motion is a drill cycle, and its target the bottom of the hole: the tool comes down to it from
+    above and goes back up.  Neither it nor the motion behind it ``continues``, although no other motion is between.
+
     What few motions state, and what holds of a dialect, is in types of its own.
 
     ``predecessors``: row that does not continue the row before it -> the rows whose ends may be its start, -1 for the
@@ -115,6 +118,7 @@ class Toolpath(MotionColumns):
     stops: Bools = field(default_factory=not_given)
     continues: Bools = field(default_factory=not_given, metadata=column(dtype=np.bool_, default=True))
     spindle: Floats = field(default_factory=not_given, metadata=column(default=np.nan))
+    drills: Bools = field(default_factory=not_given, metadata=column(dtype=np.bool_, default=False))
     inverse_time_feed: Bools = field(
         default_factory=not_given, metadata=column(dtype=np.bool_, default=False)
     )
@@ -150,6 +154,12 @@ class Toolpath(MotionColumns):
         stated = np.zeros(len(self), np.bool_)
         stated[axes.rows[np.isfinite(axes.values).all(axis=1)]] = True
         return stated
+
+    @cached_property
+    def paths_meet(self) -> Bools:
+        """(N,) motions that do not continue the one before, as other motions may precede them."""
+        beside_hole = self.drills | np.append(False, self.drills[:-1])[: len(self)]
+        return np.asarray(~self.continues & ~beside_hole)
 
     @cached_property
     def keeps_orientation(self) -> Bools:
@@ -248,6 +258,8 @@ class Toolpath(MotionColumns):
                 words.append(f"orientation {OrientationMode(self.orientation_control.mode[row]).name}")
             if self.arcs.frame[row] and kind == Kind.CIRC:
                 words.append(f"arc {ArcFrame(self.arcs.frame[row]).name}")
+            if self.drills[row]:
+                words.append("drills")
             if row in self.constraints.refused:
                 words.append(f"refused {self.constraints.refused[row].code}")
             yield " ".join(words)

@@ -60,20 +60,24 @@ def closing_findings(request: Request, ready: Prepared, written: WrittenProgram)
 
 
 def _started(ready: Prepared, written: WrittenProgram) -> list[Finding]:
-    """Cutting motions before which paths of the program meet or part: nothing leads to their corrected start."""
+    """Cutting motions before which paths of the program meet or part, or a hole is drilled: nothing leads to their
+    corrected start."""
     path = ready.task.toolpath
     on_a_path = np.isin(path.kind, (Kind.LIN, Kind.CIRC)) & written.result.corrected & ready.task.carries
-    rows = np.flatnonzero(on_a_path & ~path.continues)
+    rows = np.flatnonzero(on_a_path & ~path.continues & ~path.drills)
     rows = rows[rows > 0]
     if not len(rows):
         return []
     before = [one for one in path.predecessors.get(int(rows[0]), ()) if one >= 0]
     lines = " or ".join(str(path.line[one]) for one in before[:4])
+    why = "branches of the program meet or part" if path.paths_meet[rows[0]] else "a drill cycle is"
     message = (
-        f"branches of the program meet or part before this motion{f' (after line {lines})' if lines else ''}: its end"
+        f"{why} before this motion{f' (after line {lines})' if lines else ''}: its end"
         f" point is corrected, its start is not ({len(rows)} motions)"
     )
     help = "program a motion in air to the start of the cut, within the same branch"
+    if not path.paths_meet[rows[0]]:
+        help = "program a motion in air to the start of the cut, after the drill cycle"
     return [Finding("COR023", message, ready.task.file, int(path.line[rows[0]]), help=help)]
 
 

@@ -221,7 +221,7 @@ def _heads(ready: Prepared, rows: Ints, at_end: Bools) -> tuple[Ints, Floats, In
     if isinstance(robot.nominal, SerialArm):
         return np.arange(len(rows)), task.track.q[rows], sign
     stated = (path.configuration["turn"] >= 0) & (path.kind == Kind.PTP)
-    resets = stated | path.on_axes | ~path.continues
+    resets = stated | path.on_axes | path.paths_meet
     resets[0] = True
     group = np.cumsum(resets)
     first = np.append(True, group[rows[1:]] != group[rows[:-1]])

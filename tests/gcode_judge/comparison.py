@@ -59,9 +59,14 @@ def compare(motions: list[Motion], reading: Reading) -> Comparison:
     for line in sorted({*runs, *rows}):
         here, there = rows[line], runs[line]
         claimed = [row for row in here if reading.rows[row].claimed]
-        if here and there and all(reading.rows[row].kind == "OTHER" for row in here):
+        if here and there and all(reading.rows[row].drills for row in here):
+            # Each pass is a hole, and what is read of it its bottom.
+            bottoms = [bottom for one in _passes(there) if (bottom := _bottom(motions, one)) is not None]
+            result.motions -= len(there) - len(bottoms)
+            there = bottoms
+        elif here and there and all(reading.rows[row].kind == "OTHER" for row in here):
             # A canned cycle: many motions of rs274, of which the end is read.
-            passes = [index for index, after in pairwise([*there, -1]) if after != index + 1]
+            passes = [one[-1] for one in _passes(there)]
             result.motions -= len(there) - len(passes)
             there = [index for index in passes if not _left_at_the_bottom(motions[index])]
             if len(here) not in (1, len(there)):
@@ -104,6 +109,27 @@ def compare(motions: list[Motion], reading: Reading) -> Comparison:
             differ("order", motions[after].line, f"it runs before line {motions[before].line}")
             break
     return result
+
+
+def _passes(indices: list[int]) -> list[list[int]]:
+    """Motions that follow each other."""
+    passes: list[list[int]] = []
+    for index in indices:
+        if passes and passes[-1][-1] == index - 1:
+            passes[-1].append(index)
+        else:
+            passes.append([index])
+    return passes
+
+
+def _bottom(motions: list[Motion], hole: list[int]) -> int | None:
+    """The motion of a drill cycle that ends deepest, None where none goes down."""
+    feeds = [index for index in hole if motions[index].kind == "LIN"]
+    axes = [np.flatnonzero(np.abs(motions[i].end - motions[i].start) > 2 * motions[i].step) for i in feeds]
+    straight = [axis for axis in axes if len(axis)]
+    if not straight or any(len(axis) != 1 or axis[0] != straight[0][0] for axis in straight):
+        return None
+    return min(feeds, key=lambda index: float(motions[index].end[straight[0][0]]))
 
 
 def _left_at_the_bottom(motion: Motion) -> bool:

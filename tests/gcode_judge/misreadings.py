@@ -9,6 +9,9 @@ START = "G21 G90 G0 X1 Y2 Z3\nF100\n"
 MISREADINGS = {
     "words beside an assignment": "G21 G90 G0 X1 Y2 Z3\nF100\n#1=4 G1 X80\nM2",
     "the place after a canned cycle": "G21 G90 G0 X1 Y2 Z3\nF100 G81 X5 Z-5 R1\nG1 X9\nM2",
+    "cycles in another plane without a motion between": "G21 G90 G0 X1 Y7 Z9\nF100 G98 G81 X1 Y5 Z-1 R2\n"
+    "G18 G81 X2 Z3 Y-1 R2\nG80 G17\nG1 X5\nX2 Y2 Z2\nM2",
+    "a cycle in a plane that is not known": START + "/G19\nX-2 Z3 G81 R42\nG99 Z4\nG80\nG17 G1 X5 Y5 Z5\nM2",
     "coordinates after a tool length offset": "G21 G90 G0 X1 Y2 Z3\nF100 G43 H2\nG1 X9\nM2",
     "a code that is computed": "G21 G90 G0 X1 Y2 Z3\nG[55+1]\nG1 X5 Y3 Z2 F100\nM2",
     "a full circle that may run often or never": "G21 G90 G0 X1 Y2 Z3\no1 repeat [2]\nG2 I5 F100\no1 endrepeat\nM2",

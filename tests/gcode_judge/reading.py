@@ -24,7 +24,8 @@ class Row:
 
     code: of the finding that says that the motion is not known or not corrected, "" without.  end, centre, normal (3,),
     NaN where not known.  base, tool: their numbers, -1 where not known.  offset (3,), turn [deg]: the base in the
-    machine where the program states it, else NaN.  continues: it follows the row before it.
+    machine where the program states it, else NaN.  continues: it follows the row before it, and no other.
+    drills: its end is the bottom of a hole.
     """
 
     line: int
@@ -39,6 +40,7 @@ class Row:
     offset: np.ndarray = field(default_factory=lambda: np.full(3, np.nan))
     turn: float = float("nan")
     continues: bool = True
+    drills: bool = False
 
     @property
     def claimed(self) -> bool:
@@ -101,7 +103,8 @@ def read(made: Made) -> Reading:
                 base=number(int(toolpath.base[row])),
                 tool=number(int(toolpath.tool[row])),
                 code=toolpath.constraints.refused[row].code if row in toolpath.constraints.refused else "",
-                continues=bool(toolpath.continues[row]),
+                continues=not toolpath.paths_meet[row],
+                drills=bool(toolpath.drills[row]),
                 **placed,
             )
         )

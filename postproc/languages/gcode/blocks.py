@@ -219,6 +219,20 @@ class BlockWords:
         return self.has(*AXES, *second) | self.noted("axis", "polar")
 
     @cached_property
+    def beside(self) -> Bools:
+        """(B, 3) words U, V, W that may move something.
+
+        Axes of their own or steps of X, Y, Z: before the first that is not 0, U0 moves nothing either way."""
+        columns = [self.source.column(one) for one in SECOND]
+        first = min(
+            (int(one.block[one.value != 0][0]) for one in columns if (one.value != 0).any()), default=-1
+        )
+        if first < 0 or first >= self.stop:
+            return everywhere(False, len(self) * 3).reshape(-1, 3)
+        present = np.stack([self.how(axis) >= 0 for axis in SECOND], axis=1)
+        return np.asarray(present & (np.arange(self.start, self.stop) >= first)[:, None])
+
+    @cached_property
     def motion(self) -> Bools:
         """(B,) the block moves the machine."""
         modal = self.modal
@@ -321,8 +335,8 @@ def frame_events(
     lose(whole, given.axis & modal.unknown, What.CODE)
     lose(whole, given.axis & modal.unused, What.UNUSED)
     lose(whole, given.motion & given.twice, What.TWICE)
-    if not given.control.further and given.has(*SECOND).any():
-        parallel = np.stack([given.how(axis) >= 0 for axis in SECOND], axis=1)
+    if not given.control.further and given.beside.any():
+        parallel = given.beside
         both = np.concatenate([parallel, np.zeros((n, 3), np.bool_)], axis=1)
         lose(both, parallel.any(axis=1) & given.motion & ~home, What.PARALLEL)
     lose(whole, other | (given.motion & (np.abs(force[Group.MACRO]) == 1)), What.OTHER)
@@ -338,6 +352,7 @@ def frame_events(
         value = np.where(at_level[:, None] & deep, ends[:, None], value)
         repeats = given.has(key("L")) | given.has(key("K"))
         lose(deep, cycle & ~at_level, What.CYCLE)
+        lose(linear, cycle & (force[Group.PLANE] < 0), What.CYCLE)
         lose(whole, cycle & repeats & (force[Group.DISTANCE] != 0), What.CYCLE)
     lose(present, given.motion & (flow.reason != FlowReason.NONE), What.UNCERTAIN)
     lose(whole, given.noted("unknown"), What.TEXT)

@@ -104,6 +104,9 @@ _ARGUMENTS = {
 }
 """Codes whose axis words are no targets; G50 X Z of lathes sets coordinates as G92 does."""
 
+_DRILLS = frozenset((73, 74, 81, 82, 83, 84, 85, 86, 88, 89))
+"""Without G76 (a thread, or a hole that is left beside its axis) and G87 (from below)."""
+
 LINUXCNC = Control(
     name="linuxcnc",
     line=general_lines.line,
@@ -130,6 +133,7 @@ LINUXCNC = Control(
     frame=offsets.one_shift,
     # CENTER_ARC_RADIUS_TOLERANCE_MM and _INCH of its interp_internal.hh
     radius_gap=(0.02e-3 * math.sqrt(2), 0.002 * 25.4e-3 * math.sqrt(2)),
+    drills=_DRILLS,
 )
 """LinuxCNC, and ISO code that is of no other control."""
 
@@ -161,5 +165,6 @@ FANUC = Control(
     increments=True,
     turns=(0, 0),
     expressions=expression_values.FANUC,
+    drills=_DRILLS,
 )
 """Fanuc, and controls that follow it: Haas, Brother, Okuma and Mitsubishi in ISO code."""

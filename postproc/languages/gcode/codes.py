@@ -70,10 +70,13 @@ CODES = define(
         "GCO008": Code(
             "warning",
             "canned cycle",
-            meaning="The control generates the motions of a cycle itself.",
-            consequence="The motions are not in the program, so the block is not corrected.",
+            meaning=(
+                "The control generates the motions of a cycle itself. Holes of G73, G74, G81 to G86, G88 and G89 under "
+                "G90 are corrected where X, Y, depth and R are known; R stays, it is a plane in air."
+            ),
+            consequence="What the cycle cuts is not in this block, so the block is not corrected.",
             action="Let the post-processor write cycles as single motions.",
-            example="`G81 Z-10 R2`.",
+            example="`G91 G81 X10 Z-10 R2 L5`.",
         ),
         "GCO009": Code(
             "warning",
@@ -322,6 +325,14 @@ CODES = define(
             consequence="The cut is not corrected, because a rounded arc would leave the tolerance.",
             action="Let the post-processor write the arc as shorter arcs or as lines.",
             example="A full circle of which start and end get different corrections.",
+        ),
+        "GCW003": Code(
+            "warning",
+            "hole cannot be written",
+            meaning="The correction is as large as the distance of the hole's depth from R.",
+            consequence="The hole is not corrected: R stays, and controls refuse a depth above it.",
+            action="Let the post-processor write a higher R, or the hole as single motions.",
+            example="`G81 X10 Z-0.1 R0` where the tool deflects by 0.2 mm.",
         ),
         "GCW002": Code(
             "warning",

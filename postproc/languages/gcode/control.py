@@ -192,7 +192,8 @@ class Control:
     parameter: the letter that is no address with digits and an equals sign but a variable (R1=2); iso: every
     word belongs to a code of its block or to its motion; expressions: the language of its variables and
     expressions, None where these are not read; radius_gap [m]: by how much the radii of an arc at its start and end may
-    differ where mm and where inch are in force.
+    differ where mm and where inch are in force; drills: codes of the cycles that go to R, to the depth that the axis
+    normal to the plane states, and back.
     """
 
     name: str
@@ -223,3 +224,4 @@ class Control:
     iso: bool = False
     expressions: ExpressionLanguage | None = None
     radius_gap: tuple[float, float] = (1e-5, 1e-5)
+    drills: frozenset[int] = frozenset()

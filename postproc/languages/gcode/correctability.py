@@ -9,8 +9,9 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Ints
 from postproc.base.document import Document
-from postproc.languages.gcode.blocks import AXES, FRAMED, SECOND, BlockWords, Reasons, What
+from postproc.languages.gcode.blocks import AXES, FRAMED, BlockWords, Reasons, What
 from postproc.languages.gcode.control import Feed, Group, Move, Once
+from postproc.languages.gcode.drill_cycles import refuse_cycles
 from postproc.languages.gcode.execution import Execution
 from postproc.languages.gcode.execution_flow import FlowReason
 from postproc.languages.gcode.feeds import feeds_before_units
@@ -108,7 +109,7 @@ def check_correctability(
     ):
         refuse(given.noted(kind)[rows], code, message)
     refuse(
-        given.has(*SECOND)[rows] & (not given.control.further),
+        np.any(given.beside[rows], axis=1) & (not given.control.further),
         "GCO016",
         "the block has U, V or W: they are further axes, or steps of a lathe",
     )
@@ -131,9 +132,7 @@ def check_correctability(
     )
     quiet = np.isin(moves.move, (-1, Move.NOTHING))
     refuse(quiet, "GCO018", "the block has axis words, but no motion code is active")
-    refuse(
-        moves.move == Move.CYCLE, "GCO008", "the block is a canned cycle: its motions are not in the program"
-    )
+    refuse_cycles(moves, collector)
     refuse(
         np.isin(moves.move, (Move.SPLINE, Move.THREAD, Move.OTHER)),
         "GCO016",
@@ -242,9 +241,15 @@ def bind_names(execution: Execution) -> str:
 
 
 def locked_rows(
-    document: Document, given: BlockWords, built: Built, collector: RefusalCollector, execution: Execution
+    document: Document,
+    given: BlockWords,
+    built: Built,
+    collector: RefusalCollector,
+    execution: Execution,
+    levels: Ints,
 ) -> Refusals:
-    """Motions whose end a refused motion, an origin or other code builds on; ``given``: the whole program."""
+    """Motions whose end a refused motion, an origin or other code builds on; ``given``: the whole program; levels (K,):
+    blocks to whose level a drill cycle goes back."""
     rows, n = built.block, len(built.block)
     pins = RefusalCollector(n)
     modal = given.modal
@@ -265,6 +270,7 @@ def locked_rows(
     shifting = modal.has(Once.SHIFT) & given.has(*AXES)
     for at, message in (
         (np.flatnonzero(shifting), "G92 sets the origin at this end point"),
+        (levels, "the drill cycle after it goes back to the level of this end point"),
         (np.flatnonzero(modal.flow.calls), "code that is not read may depend on this end point"),
         (_reading(document, execution) - 1, "a variable after it reads the end position of this motion"),
         (

@@ -16,19 +16,22 @@ from postproc.languages.gcode.words import How, key
 @dataclass(frozen=True, eq=False)
 class CycleEnds:
     """level (B,) [m]: the coordinate of the working axis after the cycle of a block, NaN where it is not known;
-    inherited (B,): it is that of the motion before the cycles; axis (B,): 0, 1, 2 for X, Y, Z."""
+    inherited (B,): it is that of the motion before the cycles; axis (B,): 0, 1, 2 for X, Y, Z; source (B,): the block
+    of that motion, where it may decide on the level, else -1."""
 
     level: Floats
     inherited: Bools
     axis: Ints
+    source: Ints
 
     def stated(self, sets: Bools, blocks: Ints) -> Bools:
         """(N, 3) the coordinates that ``blocks`` (N,) state, of those that they set (N, 3)."""
         return np.asarray(sets & ~(self.inherited[blocks, None] & (self.axis[blocks, None] == np.arange(3))))
 
 
-def _leaves_unknown(given: BlockWords, lengths: Bools) -> Bools:
-    """(B,) blocks before or after which the place of the tool may be another one than the last coordinates."""
+def leaves_unknown(given: BlockWords, lengths: Bools) -> Bools:
+    """(B,) blocks before or after which the place of the tool may be another one than the last coordinates; lengths
+    (B,): those in which another tool length holds than before."""
     modal = given.modal
     once = (Once.HOME, Once.MACHINE, Once.PROBE, Once.CALL, Once.OTHER, Once.STORE)
     others = (
@@ -40,10 +43,10 @@ def _leaves_unknown(given: BlockWords, lengths: Bools) -> Bools:
 
 def _named_ends(given: BlockWords, retract: int) -> CycleEnds:
     """Of a control whose cycles are called by name: their planes are coordinates."""
-    n, column = len(given), given.words(retract)
+    n, column, none = len(given), given.words(retract), everywhere(-1, len(given))
     axis = np.array([2, 1, 0])[np.clip(given.modal.force[Group.PLANE], 0, 2)]
     if not len(column):
-        return CycleEnds(everywhere(np.nan, n), everywhere(False, n), axis)
+        return CycleEnds(everywhere(np.nan, n), everywhere(False, n), axis, none)
     # Of the latest call; uncertain ones, and a change of units after them, leave it unknown.
     sure = given.modal.flow.reason[column.block] == 0
     values = np.where(sure, column.value, np.nan)
@@ -51,7 +54,15 @@ def _named_ends(given: BlockWords, retract: int) -> CycleEnds:
     block = np.append(column.block, 0)[at]
     level = np.where(at >= 0, np.append(values, np.nan)[at], np.nan) * given.length
     level = np.where(given.length[block] == given.length, level, np.nan)
-    return CycleEnds(level, everywhere(False, n), axis)
+    return CycleEnds(level, everywhere(False, n), axis, none)
+
+
+def _level_from(given: BlockWords, row: int, cycle: Bools, source: Ints) -> int:
+    """The motion whose end is the level to which the cycle ``row`` goes back."""
+    before = row - 1
+    while before >= 0 and not given.motion[before]:
+        before -= 1
+    return int(source[before]) if before >= 0 and cycle[before] else before
 
 
 def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
@@ -67,7 +78,7 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
     cycle = given.motion & (given.move == Move.CYCLE)
     rows = np.flatnonzero(cycle)
     if not len(rows):
-        return CycleEnds(everywhere(np.nan, n), everywhere(False, n), everywhere(2, n))
+        return CycleEnds(everywhere(np.nan, n), everywhere(False, n), everywhere(2, n), everywhere(-1, n))
     level = np.full(n, np.nan)
     axis = np.array([2, 1, 0])[np.clip(given.modal.force[Group.PLANE], 0, 2)]
     absolute = given.modal.force[Group.DISTANCE] == 0
@@ -80,22 +91,35 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
     sure = given.motion & ~given.machine & absolute & certain
     placed = sure[:, None] & np.isin(hows, (How.NUMBER, How.INTEGER))
     placed &= ~(cycle[:, None] & (axis[:, None] == np.arange(3)))
-    latest = np.maximum.accumulate(np.where(placed, np.arange(n)[:, None], -1), axis=0)
     frame = np.searchsorted(events, np.arange(n))
-    lost = np.cumsum(_leaves_unknown(given, lengths))
+    # Of a cycle in a plane that is not known, neither is along which axis it works.
+    anywhere = cycle & (given.modal.force[Group.PLANE] < 0)
+    placed &= ~anywhere[:, None]
+    latest = np.maximum.accumulate(np.where(placed, np.arange(n)[:, None], -1), axis=0)
+    doubts = np.cumsum(anywhere)
+    lost = np.cumsum(leaves_unknown(given, lengths) | anywhere)
+    # A cycle that says nothing of R, G98, G99 and the frame ends as the one before it.
+    says = has_plane[rows] | ~absolute[rows] | (given.move[rows - 1] != Move.CYCLE)
+    for state in (axis, frame, back, doubts):
+        says[1:] |= state[rows[1:]] != state[rows[:-1]]
+    says[0] = True
+    heads = np.flatnonzero(says)
     at_r, before, last = np.nan, np.nan, -1
-    inherited = np.zeros(n, np.bool_)
+    inherited, source, origin = np.zeros(n, np.bool_), np.full(n, -1), -1
     drilled = [-1, -1, -1]  # the latest cycle of each axis
-    for row in rows.tolist():
-        if last < 0 or given.move[row - 1] != Move.CYCLE or axis[row] != axis[row - 1]:
+    for row, tail in zip(
+        rows[heads].tolist(), rows[np.append(heads[1:], len(rows)) - 1].tolist(), strict=True
+    ):
+        if last < 0 or given.move[row - 1] != Move.CYCLE:
             at, drill = latest[row, axis[row]], drilled[axis[row]]
             there = level[drill] if drill > at else height[at, axis[row]]
-            at = max(at, drill)
+            at, origin = max(at, drill), _level_from(given, row, cycle, source)
             same = at >= 0 and frame[at] == frame[row] and lost[at] == lost[row]
             at_r, before = np.nan, there if same else np.nan
-        elif frame[row] != frame[last]:
+        elif frame[row] != frame[last] or axis[row] != axis[last] or doubts[row] != doubts[last]:
+            # LinuxCNC goes back to the number of the other axis
             at_r, before = np.nan, np.nan
-        last = drilled[axis[row]] = row
+        last = drilled[axis[row]] = tail
         if has_plane[row]:  # one that is computed is not known
             at_r = plane[row] if absolute[row] and certain[row] else np.nan
         elif not absolute[row]:
@@ -104,6 +128,14 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
             level[row] = at_r
         elif back[row] == 0 and before >= at_r:
             level[row], inherited[row] = before, True
+        if back[row] != 1:
+            source[row] = origin
         if not inherited[row]:  # which motion a G98 after it would build on is not followed
             before = np.nan
-    return CycleEnds(level, inherited, axis)
+        for column in (level, inherited, source):
+            column[tail] = column[row]
+    like = rows[np.maximum.accumulate(np.where(says, np.arange(len(rows)), 0))]
+    for column in (level, inherited, source):
+        column[rows] = column[like]
+    level[anywhere], inherited[anywhere] = np.nan, False
+    return CycleEnds(level, inherited, axis, source)

@@ -8,15 +8,19 @@ import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 from postproc.languages.gcode.arcs import ArcGeometry
+from postproc.languages.gcode.modal_fill import everywhere
 from postproc.languages.gcode.positions import Positions
 from postproc.languages.gcode.tool_orientation import ToolOrientation
+
+OWN = 0
 
 
 @dataclass(frozen=True, eq=False)
 class GcodeMotions:
     """block (N,): row in the blocks; move (N,) Move; kind (N,) Kind; plane (N,); start, end (N, 6) [m, rad] in the
     frame of the program; place (N, 3) [m]: the end in the base; arcs in the frame, centre and normal (N, 3) of them in
-    the base; length (N,) [m] of the way."""
+    the base; length (N,) [m] of the way; room (N,) [m]: of drill cycles, from the bottom of the hole up to R, NaN of
+    all others; hidden (N,): of canned cycles, why the hole is not that of the block (``drill_cycles.WHY``)."""
 
     block: Ints
     move: Ints
@@ -30,6 +34,8 @@ class GcodeMotions:
     normal: Floats
     length: Floats
     tool_orientation: ToolOrientation
+    room: Floats
+    hidden: Ints
 
     @staticmethod
     def of(
@@ -68,4 +74,6 @@ class GcodeMotions:
             normal,
             length,
             stand,
+            everywhere(np.nan, len(block)),
+            everywhere(OWN, len(block), np.int8),
         )

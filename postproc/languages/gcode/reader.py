@@ -10,18 +10,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.base.arrays import Bools, Floats, Ints, shared
+from postproc.base.arrays import Floats, Ints, shared
 from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses, rotation_from_abc
 from postproc.base.units import DEG, MM
 from postproc.languages.dialect import PLAIN, Program, ReadingSettings
 from postproc.languages.gcode import offsets
-from postproc.languages.gcode.arcs import ArcGeometry, ArcWords, arcs, through
+from postproc.languages.gcode.block_arcs import arcs_of_blocks, given_by_point
 from postproc.languages.gcode.blocks import (
     AXES,
     SMALL_ANGLE,
-    THROUGH,
     BlockWords,
     Reasons,
     blocks,
@@ -48,6 +47,13 @@ from postproc.languages.gcode.correctability import (
 )
 from postproc.languages.gcode.cycle_ends import cycle_ends
 from postproc.languages.gcode.diagnostics import diagnostics
+from postproc.languages.gcode.drill_cycles import (
+    DrillCycles,
+    beside_holes,
+    drill_cycles,
+    stated_coordinates,
+    with_holes,
+)
 from postproc.languages.gcode.execution import FoldedWords, execute
 from postproc.languages.gcode.external_axes import external_axes, moves_external, others_move
 from postproc.languages.gcode.feeds import Feeds, blend_tolerances, blends
@@ -124,6 +130,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     said = remarks(document, source, rows, execution.order is None, foreign)
     state = {name: found.taken(name) for name in STATE}
     timed = state["feed_mode"] == Feed.INVERSE_TIME
+    drilled = found.taken("drills")
     path = Toolpath(
         kind=built.kind,
         position=found.taken("place"),
@@ -137,8 +144,12 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         frames=cell_frames,
         constraints=EditConstraints(
             refused=refused,
-            locked=locked_rows(document, given, built, collector, execution),
-            no_insert_before={**moves_external(external), **no_insert_before(given, rows, foreign)},
+            locked=locked_rows(document, given, built, collector, execution, run.levels),
+            no_insert_before={
+                **moves_external(external),
+                **no_insert_before(given, rows, foreign),
+                **beside_holes(drilled),
+            },
             orientation_programmed=found.taken("orientation_programmed"),
             exact_stays=True,
             ptp_may_change_configuration=False,
@@ -153,6 +164,8 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
             **{name: found.taken(name) for name in ("rotary_from", "rotary_to", "redundant_axis")},
         ),
         external=external,
+        drills=drilled,
+        continues=~(drilled | np.append(False, drilled[:-1])[: len(rows)]),
     )
     findings = [
         *_read_too(document, joined, execution.missing),
@@ -214,7 +227,8 @@ def _folded(words: FoldedWords, rows: Ints) -> FoldedNumbers:
 
 class FollowedMotions(NamedTuple):
     """The motions' columns, what others build on, the frames of the program, what its orientation words mean, and why
-    motions are refused; differing_radii: arcs whose radii at start and end differ."""
+    motions are refused; differing_radii: arcs whose radii at start and end differ; levels (K,): blocks that state the
+    level to which a drill cycle goes back."""
 
     columns: FilledRows
     built: Built
@@ -222,6 +236,7 @@ class FollowedMotions(NamedTuple):
     orientations: tuple[OrientationWords, ...]
     collector: RefusalCollector
     differing_radii: int
+    levels: Ints
 
 
 def _followed(
@@ -247,6 +262,7 @@ def _followed(
     allowed = blend_tolerances(given)
     lengths = tool_lengths(given, tool)
     ends = cycle_ends(given, events, lengths.changes)
+    drills = drill_cycles(given, events, offset.changed, lengths.changes)
     found, differing = FilledRows(len(rows)), 0
     for start in range(0, max(len(given), 1), PART):
         stop = min(start + PART, len(given))
@@ -261,7 +277,8 @@ def _followed(
             reasons,
         )
         where = trace.follow(way, start)
-        moves = _motions(here, where, trace, own, stands)
+        holes = drills.part(start, stop)
+        moves = _motions(here, where, trace, own, stands, holes)
         differing += int((moves.arcs.wrong == 3).sum())
         part = collector.part(slice(low, high))
         cutting = np.isin(moves.kind, (Kind.LIN, Kind.CIRC)) & lengths.off[rows[low:high]]
@@ -270,8 +287,8 @@ def _followed(
         found.put(
             high - low,
             **_columns(here, where, moves, feeds),
-            blend=blends(here, own, allowed),
-            sets=ends.stated(way.sets[own, :3], rows[low:high]),
+            blend=np.where(np.isfinite(moves.room), 0.0, blends(here, own, allowed)),
+            sets=stated_coordinates(ends.stated(way.sets[own, :3], rows[low:high]), moves, holes),
             lost=way.unknown[own, :3],
         )
     built = Built(rows, *(found.taken(name) for name in ("kind", "sets", "lost", "turned")))
@@ -279,7 +296,8 @@ def _followed(
         np.array([frame.turn for frame in trace.frames]),
         np.array([frame.shift[:3] for frame in trace.frames]),
     )
-    return FollowedMotions(found, built, frames, tuple(stands.orientations), collector, differing)
+    levels = np.unique(ends.source[np.isfinite(drills.depth) & (ends.source >= 0)])
+    return FollowedMotions(found, built, frames, tuple(stands.orientations), collector, differing, levels)
 
 
 def _columns(
@@ -301,12 +319,13 @@ def _columns(
         "centre": np.where(placed, moves.centre, np.nan),
         "normal": np.where(placed, moves.normal, np.nan),
         "sweep": np.where(placed[:, 0], moves.arcs.sweep, np.nan),
-        "orientation_programmed": stand.oriented,
+        # controls accept no rotary words in a drill cycle
+        "orientation_programmed": stand.oriented & np.isnan(moves.room),
         "redundant_axis": stand.free_axis,
         "orientation_path": stand.path,
         "rotary_from": rotary_from,
         "rotary_to": rotary_to,
-        "plane_free": _by_point(given, rows),
+        "plane_free": given_by_point(given, rows),
         "turned": stand.stated | (stand.orient < 0),
         "move": moves.move,
         "plane": force[Group.PLANE][rows],
@@ -316,6 +335,8 @@ def _columns(
         "increment": given.length_of_integer[rows],
         "frame": where.frame[rows],
         "start_position": moves.start[:, :3],
+        "drills": np.isfinite(moves.room),
+        "room": moves.room,
         "orient": stand.orient,
         "turned_values": stand.values,
         "turned_before": stand.before,
@@ -375,63 +396,26 @@ def _change(given: BlockWords, events: Ints) -> Callable[[int, ProgrammedFrame, 
 
 
 def _motions(
-    given: BlockWords, where: Positions, trace: Trace, rows: Ints, stands: ToolOrientations
+    given: BlockWords,
+    where: Positions,
+    trace: Trace,
+    rows: Ints,
+    stands: ToolOrientations,
+    holes: DrillCycles,
 ) -> GcodeMotions:
     start, end = where.start[rows], where.end[rows]
     force, move = given.modal.force, given.move[rows]
     plane = force[Group.PLANE][rows]
     bent = np.isin(move, (Move.CLOCKWISE, Move.COUNTER, Move.THROUGH)) & ~given.machine[rows]
-    desired_path = _arcs(given, rows, start, end, plane, bent)
+    desired_path = arcs_of_blocks(given, rows, start, end, plane, bent)
     kind = KINDS[move]
     kind[given.modal.has(Once.HOME)[rows]] = Kind.PTP
     kind[given.modal.has(Once.PROBE)[rows]] = Kind.LIN
     kind[force[Group.AXIAL][rows] != 0] = Kind.PTP
     kind[given.modal.unknown[rows]] = Kind.OTHER
     pose = stands.of(trace, where, rows, given.start, kind == Kind.PTP)
-    return GcodeMotions.of(rows, move, kind, plane, start, end, where, desired_path, pose)
-
-
-def _by_point(given: BlockWords, rows: Ints) -> Bools:
-    """(N,) arcs, if they are some, that a point on their path gives."""
-    words = given.has(*THROUGH)[rows] if THROUGH[0] in given.columns else np.zeros(len(rows), np.bool_)
-    return np.asarray(words | (given.move[rows] == Move.THROUGH))
-
-
-def _arcs(given: BlockWords, rows: Ints, start: Floats, end: Floats, plane: Ints, bent: Bools) -> ArcGeometry:
-    n = len(rows)
-    result = ArcGeometry(
-        np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full(n, np.nan), np.zeros(n, np.int64)
-    )
-    between = _by_point(given, rows)
-    word, usual = given.control.turns
-    turns = np.zeros(n)
-    if word in given.columns:
-        turns = np.nan_to_num(given.number(word)[rows] - usual)
-        turns[turns % 1 != 0] = np.nan
-    for some, keys in ((bent & ~between, tuple(key(letter) for letter in "IJK")), (bent & between, THROUGH)):
-        if not some.any():
-            continue
-        at = rows[some]
-        hows = np.stack([given.how(one)[at] for one in keys], axis=1)
-        values = np.stack([given.lengths(one)[at] for one in keys], axis=1)
-        group = Group.DISTANCE if keys is THROUGH else Group.ARCS
-        relative = given.modal.force[group][at] == 1
-        absolute = np.where(hows == How.ABSOLUTE, True, (relative != (group == Group.DISTANCE))[:, None])
-        absolute &= hows != How.INCREMENTAL
-        if keys is THROUGH:
-            via = np.where(absolute & (hows >= 0), values, start[some, :3] + np.where(hows >= 0, values, 0.0))
-            found = through(start[some, :3], via, end[some, :3], turns[some])
-        else:
-            counter, radius = given.move[at] == Move.COUNTER, given.lengths(key("R"))[at]
-            words = ArcWords(counter, values, absolute, radius, turns[some])
-            gap = np.asarray(given.control.radius_gap)[(given.length[at] > MM).astype(int)]
-            found = arcs(start[some, :3], end[some, :3], plane[some], words, gap)
-        either = (given.modal.force[group][at] < 0) & np.isin(hows, (How.NUMBER, How.INTEGER)).any(axis=1)
-        for array in (found.centre, found.normal, found.sweep):
-            array[either] = np.nan
-        for name in ("centre", "normal", "sweep", "wrong"):
-            getattr(result, name)[some] = getattr(found, name)
-    return result
+    moves = GcodeMotions.of(rows, move, kind, plane, start, end, where, desired_path, pose)
+    return with_holes(moves, holes, where)
 
 
 KINDS = np.full(len(Move) + 1, Kind.OTHER, np.int8)

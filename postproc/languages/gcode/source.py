@@ -151,7 +151,9 @@ def scan(raw: bytes, control: Control) -> Source:
         wordy = np.zeros(len(here), np.bool_)
         wordy[text.words.block[text.words.key != key("N")]] = True
         lines.add(here.start, here.stop, here.first, here.line, here.deleted, wordy)
-        notes += (note._replace(block=note.block + blocks) for note in text.notes)
+        notes += (
+            [Note(block + blocks, kind, said) for block, kind, said in text.notes] if blocks else text.notes
+        )
         comments.add(text.comments.reshape(-1))
         blocks += len(here)
         line += raw.count(b"\n", start, end)

@@ -29,8 +29,8 @@ class WriterState:
     coordinates in the base: base = frame @ (number * scale). start_position (N, 3) [m]: where the motion starts, in its
     ``frame``; NaN where not known. orient (N,): row in ``orientations``, what the orientation words mean there, -1
     where none are in force; turned_values, turned_before (N, 3): the numbers of these words in force at the end of the
-    motion, and just before its block; NaN where not known. feed_mode (N,) Feed: F of INVERSE_TIME belongs to the whole
-    motion.
+    motion, and just before its block; NaN where not known. room (N,) [m]: of drill cycles, from the bottom of the hole
+    up to R, NaN of all others. feed_mode (N,) Feed: F of INVERSE_TIME belongs to the whole motion.
     """
 
     move: Ints
@@ -44,6 +44,7 @@ class WriterState:
     orient: Ints
     turned_values: Floats
     turned_before: Floats
+    room: Floats
     feed_mode: Ints
 
     def __len__(self) -> int:

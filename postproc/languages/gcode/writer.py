@@ -11,6 +11,7 @@ from postproc.base.arrays import Bools, Floats, Ints, differs
 from postproc.base.decimals import fixed
 from postproc.base.document import Edits
 from postproc.base.findings import Finding
+from postproc.base.geometry import lengths
 from postproc.languages.dialect import EditedTargets, Plan, Program, Role, WritingSettings
 from postproc.languages.gcode.control import Move
 from postproc.languages.gcode.source_map import SourceMapPart
@@ -25,8 +26,8 @@ from postproc.languages.gcode.writer_text import (
     RADIUS,
     TURNED,
     ProgrammedWords,
-    stated,
 )
+from postproc.languages.gcode.written_motions import WrittenMotions
 from postproc.toolpath import Kind
 
 TURN = 2 * np.pi
@@ -69,6 +70,7 @@ def _written(style: Style, motions: WrittenMotions, before: Ends) -> tuple[Edits
     held, turned = _orientations(motions, sheet, before.turned)
     convert, bad = _arcs(motions, ends, sheet)
     held |= {int(motions.row[m]): "GCW001" for m in np.flatnonzero(bad).tolist()}
+    held |= {int(motions.row[m]): "GCW003" for m in np.flatnonzero(_above_plane(motions)).tolist()}
     after = Ends(ends.end[-1], turned)
     if held:
         return Edits.joined(()), held, after
@@ -121,97 +123,6 @@ class _Forbidden:
         divided = np.unique(rows[self.whole[rows]])
         if len(divided):
             raise ValueError(f"motions that cannot be divided are divided: rows {divided[:5].tolist()}")
-
-
-@dataclass(frozen=True, eq=False)
-class _Path:
-    """Rows of a Toolpath."""
-
-    kind: Ints
-    base: Ints
-    position: Floats
-    rotation: Floats
-    centre: Floats
-    sweep: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class _PlannedMotions:
-    """Motions of a plan; before (3,): where the one ahead of them ends."""
-
-    position: Floats
-    rotation: Floats
-    centre: Floats
-    normal: Floats
-    sweep: Floats
-    share: Floats
-    before: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class WrittenMotions:
-    """M motions of a plan, and the rows that they stem from with the one ahead and the one after them.
-
-    first: number of row 0 in the program; row (M,); last: the row after them, -1 where there is none; role, own,
-    is_transition (M,): of the plan; fixed (M,): the block must stay as it is.
-    """
-
-    places: SourceMapPart
-    text: ProgrammedWords
-    path: _Path
-    plan: _PlannedMotions
-    first: int
-    row: Ints
-    last: int
-    role: Ints
-    own: Bools
-    is_transition: Bools
-    fixed: Bools
-
-    def __len__(self) -> int:
-        return len(self.row)
-
-    @staticmethod
-    def of(
-        program: Program, plan: Plan, writing: WritingSettings, start: int, stop: int, refused: Bools
-    ) -> WrittenMotions:
-        """The motions of the rows start .. stop - 1; ``refused`` (N,): rows that stay."""
-        path = program.toolpath
-        first, behind = max(start - 1, 0), min(stop + 1, len(path))
-        places = program.text.part(first, behind)
-        low, high = np.searchsorted(plan.source, [start, stop]).tolist()
-        rows, motions = slice(first, behind), slice(low, high)
-        before = plan.position[low - 1 : low][0] if low else np.full(3, np.nan)
-        here = _PlannedMotions(
-            plan.position[motions],
-            plan.rotation[motions],
-            plan.centre[motions],
-            plan.normal[motions],
-            plan.sweep[motions],
-            plan.share[motions],
-            before,
-        )
-        row, role = plan.source[motions] - first, plan.role[motions]
-        return WrittenMotions(
-            places,
-            stated(places, writing),
-            _Path(
-                path.kind[rows],
-                path.base[rows],
-                path.position[rows],
-                path.rotation[rows],
-                path.arcs.centre[rows],
-                path.arcs.sweep[rows],
-            ),
-            here,
-            first,
-            row,
-            stop - first if behind > stop else -1,
-            role,
-            role == Role.ORIGINAL,
-            role == Role.TRANSITION,
-            refused[rows][row] | np.isnan(here.position[:, 0]),
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -408,6 +319,16 @@ def _arcs(motions: WrittenMotions, ends: Followed, sheet: _Sheet) -> tuple[Bools
     return convert, bad
 
 
+def _above_plane(motions: WrittenMotions) -> Bools:
+    """(M,) drill cycles that would end above their R, which stays."""
+    room, row = motions.places.room[motions.row], motions.row
+    drills = np.flatnonzero(np.isfinite(room))
+    above = np.zeros(len(motions), dtype=bool)
+    change = motions.plan.position[drills] - motions.path.position[row[drills]]
+    above[drills] = lengths(change) >= room[drills]
+    return above
+
+
 def _no_empty_block(motions: WrittenMotions, sheet: _Sheet, ends: Followed) -> None:
     """An inserted block without words would be no motion: it gets X."""
     empty = np.flatnonzero(~motions.own & ~sheet.write.any(axis=1))
@@ -440,6 +361,7 @@ def _texts(sheet: _Sheet, missing: Bools) -> dict[int, dict[int, bytes]]:
 
 _MESSAGES = {
     "GCW001": "the corrected arc cannot be written in the form of its block",
+    "GCW003": "the correction is as large as the distance from R to the depth of the hole",
     "GCW002": "the words of this block cannot express the corrected orientation",
 }
 

@@ -1,0 +1,59 @@
+"""The arcs among the blocks of a program: from the words that state them to their geometry."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.units import MM
+from postproc.languages.gcode.arcs import ArcGeometry, ArcWords, arcs, through
+from postproc.languages.gcode.blocks import THROUGH, BlockWords
+from postproc.languages.gcode.control import Group, Move
+from postproc.languages.gcode.words import How, key
+
+
+def given_by_point(given: BlockWords, rows: Ints) -> Bools:
+    """(N,) arcs among the motions in the blocks ``rows`` (N,) that a point on their path gives, if they are some."""
+    words = given.has(*THROUGH)[rows] if THROUGH[0] in given.columns else np.zeros(len(rows), np.bool_)
+    return np.asarray(words | (given.move[rows] == Move.THROUGH))
+
+
+def arcs_of_blocks(
+    given: BlockWords, rows: Ints, start: Floats, end: Floats, plane: Ints, bent: Bools
+) -> ArcGeometry:
+    """The arcs among the motions in the blocks ``rows`` (N,), which are ``bent`` (N,), from ``start`` to ``end`` (N, 6)
+    [m, rad] in ``plane`` (N,); NaN for all others."""
+    n = len(rows)
+    result = ArcGeometry(
+        np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full(n, np.nan), np.zeros(n, np.int64)
+    )
+    between = given_by_point(given, rows)
+    word, usual = given.control.turns
+    turns = np.zeros(n)
+    if word in given.columns:
+        turns = np.nan_to_num(given.number(word)[rows] - usual)
+        turns[turns % 1 != 0] = np.nan
+    for some, keys in ((bent & ~between, tuple(key(letter) for letter in "IJK")), (bent & between, THROUGH)):
+        if not some.any():
+            continue
+        at = rows[some]
+        hows = np.stack([given.how(one)[at] for one in keys], axis=1)
+        values = np.stack([given.lengths(one)[at] for one in keys], axis=1)
+        group = Group.DISTANCE if keys is THROUGH else Group.ARCS
+        relative = given.modal.force[group][at] == 1
+        absolute = np.where(hows == How.ABSOLUTE, True, (relative != (group == Group.DISTANCE))[:, None])
+        absolute &= hows != How.INCREMENTAL
+        if keys is THROUGH:
+            via = np.where(absolute & (hows >= 0), values, start[some, :3] + np.where(hows >= 0, values, 0.0))
+            found = through(start[some, :3], via, end[some, :3], turns[some])
+        else:
+            counter, radius = given.move[at] == Move.COUNTER, given.lengths(key("R"))[at]
+            words = ArcWords(counter, values, absolute, radius, turns[some])
+            gap = np.asarray(given.control.radius_gap)[(given.length[at] > MM).astype(int)]
+            found = arcs(start[some, :3], end[some, :3], plane[some], words, gap)
+        either = (given.modal.force[group][at] < 0) & np.isin(hows, (How.NUMBER, How.INTEGER)).any(axis=1)
+        for array in (found.centre, found.normal, found.sweep):
+            array[either] = np.nan
+        for name in ("centre", "normal", "sweep", "wrong"):
+            getattr(result, name)[some] = getattr(found, name)
+    return result
