@@ -24,7 +24,7 @@ SIZES = {
 CORNER, ENGAGEMENT, DRIFT = 0.3, 1.5, 0.05 * MM
 """Share of the force added in corners; change of the force per mm of error, as a share; [m] over the whole program."""
 
-FACTORS = (0.5, 1.0, 2.0)
+FACTORS = (0.5, 1.0, 2.0, 4.0)
 """Sizes that are tried, in standard deviations."""
 
 _SEEN = 0.3
