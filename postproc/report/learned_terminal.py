@@ -24,6 +24,8 @@ WORDS = {
 
 
 MOST_ALTERNATIVES = 4
+NOTHING = 1e-3
+"""Share of its standard deviation below which a value is shown as 0."""
 
 
 def headline(learned: Learned) -> str:
@@ -88,7 +90,8 @@ def _causes(learned: Learned, verbose: bool) -> Table:
             turned = cause.unit == "rad" and cause.group == "force"
             if cause.group != group or (turned and not verbose):
                 continue
-            entry = cause_entry(cause, value, deviation)
+            nothing = not cause.is_share() and abs(value) < NOTHING * deviation
+            entry = cause_entry(cause, 0.0 if nothing else value, deviation)
             unit = "x" if entry["unit"] == "1" else f" {entry['unit']}"
             before = (
                 f"1 +- {entry['before_ci95']:.2f}"
