@@ -37,7 +37,7 @@ def test_a_size_that_cannot_be_negative_gains_nothing_from_it():
     column = 3e-5 * np.sign(rng.normal(size=(count, 1)))
     rest = 1.2 * column[:, 0] + rng.normal(0, 1e-5, count)
     bare = Explanation(layout, SmoothField(), rest, np.zeros((count, 0)), np.zeros(count))
-    cause = Cause("backlash.b1", "effect", CauseKind.VALUE, 6e-5, "rad")
+    cause = Cause("backlash.b1", "effect", CauseKind.VALUE, 6e-5, "rad", positive=True)
     gains = {}
     for sign in (1.0, -1.0):
         candidate = MissingEffect("backlash of A1", (cause,), None, sign * column, True)

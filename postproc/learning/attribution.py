@@ -143,6 +143,9 @@ def attribute(
         if len(alike) > 1 and alternatives:
             break
         best = ranked[0]
+        if len(alike) > 1 and best.effect.name in ("engagement", "drift"):
+            alternatives = tuple(one.effect.name for one in alike)  # the next program could not apply it
+            break
         wider = [replace(cause, deviation=best.factor * cause.deviation) for cause in best.effect.causes]
         trial = prediction.with_causes(wider, best.effect.model)
         start = np.append(x, np.zeros(len(wider)))

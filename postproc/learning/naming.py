@@ -19,7 +19,6 @@ from scipy.special import log_ndtr, logsumexp
 
 from postproc.base.arrays import Bools, Ints
 from postproc.learning.candidates import FACTORS, MissingEffect
-from postproc.learning.causes import CauseKind
 from postproc.learning.covariance import Explanation, choose_surface, without_field
 from postproc.learning.excluded_points import MOST_OUTLIERS, OUTLIERS_EACH, find_outliers
 
@@ -108,7 +107,7 @@ def gains_with(explained: Explanation, effect: MissingEffect, rows: Ints) -> lis
     """ln p(r | size) - ln p(r) for each size of ``FACTORS``; rows (J,): the effect's rows of the explained points."""
     columns, rest = explained.whiten(effect.columns[rows]), explained.whiten(explained.rest)
     gram, pull = columns.T @ columns, columns.T @ rest
-    bounded = [i for i, cause in enumerate(effect.causes) if cause.kind is CauseKind.VALUE]
+    bounded = [i for i, cause in enumerate(effect.causes) if cause.positive]
     gains = []
     for factor in FACTORS:
         precision = np.eye(len(gram)) + factor**2 * gram

@@ -14,6 +14,7 @@ from postproc.base.units import MM
 from postproc.learning.attribution import Attribution
 from postproc.learning.causes import CauseKind, CausePrediction
 from postproc.learning.covariance import FIELDS, WHITES, Explanation, Layout, SmoothField, choose_surface
+from postproc.learning.excluded_points import MOST_OUTLIERS, OUTLIERS_EACH, find_outliers
 from postproc.learning.measured_part import MeasuredPart
 
 LIKELIER = 3.0
@@ -69,6 +70,13 @@ class FirstLook:
         whole = Explanation(self.layout, SmoothField(), deviation - errors, self.columns, self.by_force)
         return choose_surface(whole, 1).evidence
 
+    def robust_evidence(self, deviation: Floats) -> float:
+        """The same of deviations (K,) [m] with their outliers excluded, each at its cost."""
+        whole = Explanation(self.layout, SmoothField(), deviation - self.errors, self.columns, self.by_force)
+        out = find_outliers(whole, int(MOST_OUTLIERS * len(deviation)))
+        inside = np.setdiff1d(np.arange(len(deviation)), out)
+        return choose_surface(whole.part(inside), 1).evidence + OUTLIERS_EACH * len(out)
+
 
 def check_deviations(look: FirstLook, feature: Sequence[str], original: bool, file: str) -> list[Finding]:
     """Whether the deviations are too small for the probe, or far likelier with the other sign, exchanged between two of
@@ -123,7 +131,7 @@ def _check_offset(look: FirstLook, present: float, file: str) -> list[Finding]:
 def _check_features(look: FirstLook, feature: Sequence[str], present: float, file: str) -> list[Finding]:
     names = sorted({name for name in feature if name})
     rows = {name: np.array([i for i, one in enumerate(feature) if one == name]) for name in names}
-    best, pair = 0.0, ("", "")
+    best, pair, likeliest = 0.0, ("", ""), look.deviation
     for one, other in islice(combinations(names, 2), MOST_PAIRS):
         count = min(len(rows[one]), len(rows[other]))
         first, second = rows[one][:count], rows[other][:count]
@@ -131,7 +139,11 @@ def _check_features(look: FirstLook, feature: Sequence[str], present: float, fil
         exchanged[first], exchanged[second] = look.deviation[second], look.deviation[first]
         gain = look.evidence(exchanged, look.errors) - present
         if gain > best:
-            best, pair = gain, (one, other)
+            best, pair, likeliest = gain, (one, other), exchanged
+    if best <= EXCHANGED:
+        return []
+    # single points that are far off, as in corners, may like another place better
+    best = look.robust_evidence(likeliest) - look.robust_evidence(look.deviation)
     if best <= EXCHANGED:
         return []
     message = (
