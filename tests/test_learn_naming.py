@@ -26,8 +26,8 @@ def test_a_corner_reaches_as_far_as_the_cutter():
 
 def test_a_size_that_cannot_be_negative_gains_nothing_from_it():
     """The same column with either sign: the evidence of the one that the data contradict is far below that of none."""
-    from postproc.learning.attribution import evidence_with
     from postproc.learning.covariance import Explanation, Layout, SmoothField
+    from postproc.learning.naming import gains_with
 
     rng = np.random.default_rng(0)
     count = 60
@@ -37,13 +37,76 @@ def test_a_size_that_cannot_be_negative_gains_nothing_from_it():
     column = 3e-5 * np.sign(rng.normal(size=(count, 1)))
     rest = 1.2 * column[:, 0] + rng.normal(0, 1e-5, count)
     bare = Explanation(layout, SmoothField(), rest, np.zeros((count, 0)), np.zeros(count))
-    cause = Cause("backlash.b1", "effect", CauseKind.VALUE, 6e-5, "rad")
+    cause = Cause("backlash.b1", "effect", CauseKind.VALUE, 6e-5, "rad", positive=True)
     gains = {}
     for sign in (1.0, -1.0):
         candidate = MissingEffect("backlash of A1", (cause,), None, sign * column, True)
-        gains[sign] = evidence_with(bare.with_columns(sign * column), candidate) - bare.evidence
+        gains[sign] = max(gains_with(bare, candidate, np.arange(count)))
     assert gains[1.0] > 100
     assert gains[-1.0] < gains[1.0] - 100
+
+
+def layout_of(rng, count):
+    """Points of a plate with a normal of their own each, and a probe of 10 um."""
+    from postproc.learning.covariance import Layout
+
+    normal = rng.normal(size=(count, 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    free = np.zeros((count, 0))
+    return Layout(rng.uniform(0, 0.3, (count, 3)), normal, np.full(count, 1e-5), free, np.zeros(count, int))
+
+
+def test_the_gain_of_an_effect_is_the_ratio_of_two_normal_densities():
+    """Against scipy's density of the whole covariance, for a shift of either sign."""
+    from scipy.stats import multivariate_normal
+
+    from postproc.learning.candidates import FACTORS
+    from postproc.learning.covariance import Explanation, SmoothField
+    from postproc.learning.naming import gains_with
+
+    rng = np.random.default_rng(3)
+    count = 25
+    layout, columns = layout_of(rng, count), 1e-5 * rng.normal(size=(count, 2))
+    rest, causes = 3e-5 * rng.normal(size=count), 2e-5 * rng.normal(size=(count, 3))
+    bare = Explanation(layout, SmoothField(1e-5, 0.06, 3e-6), rest, causes, 1e-5 * rng.normal(size=count))
+    effect = MissingEffect(
+        "drift", tuple(Cause(a, "effect", CauseKind.SHIFT, 1.0) for a in "xy"), None, columns, False
+    )
+    covariance = layout.covariance(bare.surface, bare.by_force) + causes @ causes.T
+    for factor, gain in zip(FACTORS, gains_with(bare, effect, np.arange(count)), strict=True):
+        with_it = covariance + factor**2 * columns @ columns.T
+        likely = [multivariate_normal(cov=1e10 * one).logpdf(1e5 * rest) for one in (with_it, covariance)]
+        assert gain == pytest.approx(likely[0] - likely[1], abs=1e-6)
+
+
+def test_outliers_are_those_that_all_others_contradict_whatever_their_order():
+    """Each one leaves by the residual to a fit of the points that remain, made anew here."""
+    from postproc.learning.covariance import Explanation, SmoothField
+    from postproc.learning.excluded_points import OUTLIER, find_outliers
+
+    rng = np.random.default_rng(5)
+    count = 40
+    layout, columns = layout_of(rng, count), 3e-5 * rng.normal(size=(count, 4))
+    rest = columns @ rng.normal(size=4) + rng.normal(0, 1e-5, count)
+    rest[[4, 17, 30]] += [2e-4, -3e-4, 1.5e-4]
+    explained = Explanation(layout, SmoothField(), rest, columns, np.zeros(count))
+    assert find_outliers(explained, 10).tolist() == [4, 17, 30]
+    assert find_outliers(explained, 2).tolist() == [4, 17]
+    inside = np.setdiff1d(np.arange(count), [4, 17, 30])
+    assert np.abs(explained.part(inside).standardised()).max() < OUTLIER
+    assert find_outliers(explained.part(inside), 10).size == 0
+
+
+def test_a_set_of_effects_has_the_probability_that_is_asked_of_it():
+    """Gains of ln 90, ln 8 and ln 2 share as 90, 8 and 2: two of them have 98 %, and one alone is named at 96 %."""
+    from postproc.learning.naming import WeighedEffect, probable_set
+
+    def ranked(*shares):
+        return [WeighedEffect(None, float(np.log(share)), 1.0, np.ones(1, bool)) for share in shares]
+
+    assert len(probable_set(ranked(90, 8, 2))) == 2
+    assert len(probable_set(ranked(96, 3, 1))) == 1
+    assert len(probable_set(ranked(1, 1, 1))) == 3
 
 
 @pytest.mark.slow

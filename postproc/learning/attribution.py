@@ -8,35 +8,21 @@ the deviations are far likelier with it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.special import log_ndtr
 
 from postproc.base.arrays import Bools, Floats, Ints
-from postproc.base.units import MM
-from postproc.learning.candidates import FACTORS, Circumstances, MissingEffect, candidates
-from postproc.learning.causes import Cause, CauseKind, CausePrediction
-from postproc.learning.covariance import Explanation, Layout, SmoothField, choose_surface
+from postproc.learning.candidates import Circumstances, MissingEffect, candidates
+from postproc.learning.causes import Cause, CausePrediction
+from postproc.learning.covariance import Explanation, Layout, SmoothField, choose_surface, without_field
+from postproc.learning.excluded_points import MOST_OUTLIERS, find_outliers
+from postproc.learning.naming import NAMED, probable_set, weigh_effects
 
 ROUNDS = 4
 SETTLED = 0.01
 """Standard deviations by which a cause still moves at the end."""
-
-OUTLIER, MOST_OUTLIERS = 4.0, 0.1
-"""Standardised residual of an outlier, times the scatter of all where that is larger; share of points at most."""
-
-OUTLIERS_EACH = float(np.log(0.01) + np.log(1.0 / (1.0 * MM)))
-"""Logarithm of the probability density of an outlier: one in a hundred, anywhere within a millimetre."""
-
-TOUCHED = 3.0
-"""An effect acts on a point where one standard deviation of it is so many times the scatter of the probe."""
-
-NAMED, AHEAD = np.log(100.0), np.log(10.0)
-"""Logarithms: how much likelier the deviations are with an effect that is named than without it (some twenty are
-looked for), and than with any other."""
 
 MOST_NAMED = 2
 
@@ -55,7 +41,8 @@ class Attribution:
 
     prediction: of all points with the causes; deviation (K,) [m]; kept (K,): no outlier; x (P,): the causes in their
     own units, logarithms of shares; covariance (P, P); explained: of the kept points at x; named: effects that joined;
-    rivals: effects that did not, the likeliest first; verdict; standardised
+    rivals: effects that did not, the likeliest first; alternatives: names of effects of which the part does
+    not tell which, the likeliest first; stand_in: the one of them that joined; verdict; standardised
     (K,): residuals of left-out points; gain: share of what was learnt that is applied.
     """
 
@@ -69,6 +56,8 @@ class Attribution:
     named: tuple[Likelier, ...]
     candidates: tuple[MissingEffect, ...]
     rivals: tuple[Likelier, ...]
+    alternatives: tuple[str, ...]
+    stand_in: str
     verdict: str
     standardised: Floats
     gain: float = 1.0
@@ -80,6 +69,10 @@ class Attribution:
     @property
     def surface(self) -> SmoothField:
         return self.explained.surface
+
+    def is_unsure(self, cause: Cause) -> bool:
+        """Whether the part does not tell it from other effects: it is applied at this place only."""
+        return bool(self.stand_in) and self.stand_in in (cause.place, cause.name)
 
     @cached_property
     def deviations(self) -> Floats:
@@ -129,45 +122,49 @@ def attribute(
     prediction: CausePrediction, deviation: Floats, layout: Layout, around: Circumstances, search: bool = True
 ) -> Attribution:
     """The causes of deviations (K,) [m]; ``search``: for effects that the model misses."""
-    kept = np.ones(len(deviation), bool)
-    x, kept = _settle(prediction, deviation, layout, prediction.before[0].copy(), kept, outliers=True)
+    x, kept = prediction.before[0].copy(), np.ones(len(deviation), bool)
+    x, kept = _settle(prediction, deviation, layout, x, kept, outliers=True)
     explained = _explained(prediction, deviation, layout, x, kept)
     named: list[Likelier] = []
     joined: list[MissingEffect] = []
     rivals: list[Likelier] = []
-    verdict = "nothing_missing"
+    alternatives: tuple[str, ...] = ()
+    stand_in = ""
     while search:
         noise = float(np.median(layout.sigma[kept]))
-        offered = candidates(prediction, x, around, noise, [one.name for one in named])
-        everything = _linearised(
-            prediction, deviation, layout, x, np.ones(len(kept), bool), explained.surface
-        )
-        gains = _gains(explained, everything, offered, kept)
-        rivals = [Likelier(offered[i].name, gain.gain) for i, gain in _ranked(gains)]
-        if not rivals or rivals[0].gain < NAMED:
+        every = np.ones(len(kept), bool)
+        everything = _linearised(prediction, deviation, layout, x, every, explained.surface)
+        offered = candidates(prediction, x, around, noise, [one.name for one in joined])
+        ranked = weigh_effects(explained, everything, offered, kept)
+        rivals = [Likelier(one.effect.name, one.gain) for one in ranked]
+        if not rivals or rivals[0].gain < NAMED or len(named) == MOST_NAMED:
             break
-        if len(rivals) > 1 and rivals[0].gain - rivals[1].gain < AHEAD:
-            verdict = "ambiguous"
+        alike = probable_set(ranked)
+        if len(alike) > 1 and alternatives:
             break
-        if len(named) == MOST_NAMED:
+        best = ranked[0]
+        if len(alike) > 1 and best.effect.name in ("engagement", "drift"):
+            alternatives = tuple(one.effect.name for one in alike)  # the next program could not apply it
             break
-        best = _ranked(gains)[0][0]
-        candidate, factor = offered[best], gains[best].factor
-        wider = [replace(cause, deviation=factor * cause.deviation) for cause in candidate.causes]
-        trial = prediction.with_causes(wider, candidate.model)
+        wider = [replace(cause, deviation=best.factor * cause.deviation) for cause in best.effect.causes]
+        trial = prediction.with_causes(wider, best.effect.model)
+        start = np.append(x, np.zeros(len(wider)))
         try:
-            moved, kept_now = _settle(
-                trial, deviation, layout, np.append(x, np.zeros(len(wider))), gains[best].kept, outliers=True
-            )
+            moved, kept_now = _settle(trial, deviation, layout, start, best.kept, outliers=True)
         except np.linalg.LinAlgError:
             break
-        if not np.isfinite(moved).all() or _is_null(trial, moved, len(wider)):
+        if not np.isfinite(moved).all():
             break
-        named.append(rivals[0])
-        joined.append(candidate)
-        prediction, x, kept = trial, moved, kept_now
-        explained = _explained(prediction, deviation, layout, x, kept)
-    verdict = _verdict(verdict, bool(named), explained)
+        fitted = _explained(trial, deviation, layout, moved, kept_now)
+        if not _differs_from_null(fitted, len(wider)):
+            break
+        if len(alike) > 1:
+            alternatives, stand_in = tuple(one.effect.name for one in alike), best.effect.name
+        else:
+            named.append(rivals[0])
+        joined.append(best.effect)
+        prediction, x, kept, explained = trial, moved, kept_now, fitted
+    verdict = _verdict(bool(alternatives), bool(named), explained)
     mean, covariance = explained.causes()
     root = prediction.before[1]
     standardised = np.full(len(deviation), np.nan)
@@ -183,21 +180,26 @@ def attribute(
         tuple(named),
         tuple(joined),
         tuple(rivals),
+        alternatives,
+        stand_in,
         verdict,
         standardised,
     )
 
 
-def _is_null(prediction: CausePrediction, x: Floats, count: int) -> bool:
-    """Whether all of the last ``count`` causes are at their null: their sign is not one that they can have."""
-    return bool(np.all(np.abs(x[-count:]) < 0.05 * prediction.deviations[-count:]))
+def _differs_from_null(explained: Explanation, count: int) -> bool:
+    """Whether the last ``count`` causes are as far from their null as the gain of an effect that is named says:
+    m^T V^-1 m / 2 of their mean m and covariance V."""
+    mean, covariance = explained.causes()
+    own = mean[-count:]
+    return bool(0.5 * own @ np.linalg.solve(covariance[-count:, -count:], own) > NAMED)
 
 
-def _verdict(verdict: str, named: bool, explained: Explanation) -> str:
+def _verdict(ambiguous: bool, named: bool, explained: Explanation) -> str:
     smooth = has_field(explained)
     if named:
-        return "partly_named" if verdict == "ambiguous" or smooth else "named"
-    if verdict == "ambiguous":
+        return "partly_named" if ambiguous or smooth else "named"
+    if ambiguous:
         return "ambiguous"
     return "unknown" if smooth else "nothing_missing"
 
@@ -206,16 +208,7 @@ def has_field(explained: Explanation) -> bool:
     """Whether a smooth error without a name is far likelier than none."""
     if explained.surface.size == 0.0:
         return False
-    none = choose_surface_without_field(explained)
-    return bool(explained.evidence - none.evidence > NAMED)
-
-
-def choose_surface_without_field(explained: Explanation) -> Explanation:
-    """The greatest evidence without a smooth error."""
-    from postproc.learning.covariance import WHITES
-
-    every = [explained.with_surface(SmoothField(0.0, explained.surface.length, float(w))) for w in WHITES]
-    return max(every, key=lambda one: one.evidence)
+    return bool(explained.evidence - without_field(explained).evidence > NAMED)
 
 
 def _explained(
@@ -266,7 +259,7 @@ def _settle(
     for turn in range(ROUNDS):
         explained = _linearised(prediction, deviation, layout, x, kept, surface)
         if turn < 2 and outliers:
-            out = _outliers(explained, len(deviation), int((~kept).sum()))
+            out = find_outliers(explained, int(MOST_OUTLIERS * len(deviation)) - int((~kept).sum()))
             if len(out):
                 kept = kept.copy()
                 kept[np.flatnonzero(kept)[out]] = False
@@ -283,78 +276,3 @@ def _settle(
 
 FIRST_FIELD = 10e-6
 """[m] Size of the smooth field before anything is known of it."""
-
-
-def _outliers(explained: Explanation, count: int, gone: int) -> Ints:
-    """Points that all others and the causes contradict, one at a time, the farthest first."""
-    inside = np.arange(len(explained.rest))
-    out: list[int] = []
-    most = int(MOST_OUTLIERS * count) - gone
-    now = explained
-    while len(out) < most and len(inside) > 6:
-        size = np.abs(now.standardised())
-        scatter = max(1.0, 1.4826 * float(np.median(size)))
-        worst = int(np.argmax(size))
-        if size[worst] <= OUTLIER * scatter:
-            break
-        out.append(int(inside[worst]))
-        inside = np.delete(inside, worst)
-        now = explained.part(inside)
-    return np.array(sorted(out), np.int64)
-
-
-@dataclass(frozen=True, eq=False)
-class _Gain:
-    """By how much the evidence grows with a candidate, with which factor of its size, and the points (K,) that are then
-    no outliers."""
-
-    gain: float
-    factor: float
-    kept: Bools
-
-
-def _gains(
-    explained: Explanation, everything: Explanation, offered: Sequence[MissingEffect], kept: Bools
-) -> list[_Gain]:
-    """Of each candidate; everything: all points, outliers included.
-
-    An outlier that the candidate acts on may be none with it: points in corners, say, where only a force in corners
-    shows."""
-    present = explained.evidence + OUTLIERS_EACH * int((~kept).sum())
-    found = []
-    for candidate in offered:
-        touched = np.abs(candidate.columns).max(axis=1) > TOUCHED * np.median(everything.layout.sigma)
-        best = _Gain(-np.inf, 1.0, kept)
-        for points in [kept] + ([kept | touched] if (touched & ~kept).any() else []):
-            rows = np.flatnonzero(points)
-            own = explained if points is kept else everything.part(rows)
-            for start in (own, choose_surface_without_field(own)):
-                for factor in FACTORS:
-                    with_it = start.with_columns(factor * candidate.columns[rows])
-                    gain = evidence_with(with_it, candidate) + OUTLIERS_EACH * int((~points).sum()) - present
-                    if gain > best.gain:
-                        best = _Gain(gain, factor, points)
-        found.append(best)
-    for i, _ in _ranked(found)[:3]:
-        rows, columns = np.flatnonzero(found[i].kept), found[i].factor * offered[i].columns
-        own = explained if found[i].kept is kept else everything.part(rows)
-        full = choose_surface(own.with_columns(columns[rows]))
-        gain = evidence_with(full, offered[i]) + OUTLIERS_EACH * int((~found[i].kept).sum()) - present
-        found[i] = replace(found[i], gain=max(found[i].gain, gain))
-    return found
-
-
-def evidence_with(explained: Explanation, candidate: MissingEffect) -> float:
-    """Of an explanation whose last causes are those of a candidate.  A parameter that has no negative values has half
-    of the normal distribution before and its share above null after: ln p + sum ln(2 Phi(mean / deviation))."""
-    evidence = explained.evidence
-    bounded = [i for i, c in enumerate(candidate.causes, -len(candidate.causes)) if c.kind is CauseKind.VALUE]
-    if bounded:
-        mean, covariance = explained.causes()
-        ratio = mean[bounded] / np.sqrt(np.maximum(np.diag(covariance)[bounded], 1e-12))
-        evidence += float(np.sum(np.log(2.0) + log_ndtr(ratio)))
-    return evidence
-
-
-def _ranked(gains: Sequence[_Gain]) -> list[tuple[int, _Gain]]:
-    return sorted(enumerate(gains), key=lambda one: -one[1].gain)

@@ -24,7 +24,7 @@ SIZES = {
 CORNER, ENGAGEMENT, DRIFT = 0.3, 1.5, 0.05 * MM
 """Share of the force added in corners; change of the force per mm of error, as a share; [m] over the whole program."""
 
-FACTORS = (0.5, 1.0, 2.0)
+FACTORS = (0.5, 1.0, 2.0, 4.0)
 """Sizes that are tried, in standard deviations."""
 
 _SEEN = 0.3
@@ -94,6 +94,7 @@ def _of_effect(prediction: CausePrediction, x: Floats, name: str, size: float) -
                 term,
                 parameter.name,
                 place=label,
+                positive=True,
             )
         )
     found = []
@@ -127,9 +128,10 @@ def _of_process(prediction: CausePrediction, x: Floats, around: Circumstances) -
         ("corner_force", CORNER, around.corner),
         ("engagement", ENGAGEMENT, -prediction.errors(x) / MM),
     ):
+        unit = "1" if name == "corner_force" else "1/mm"
         cause = Cause(
-            name, "effect", CauseKind.FORCE, size, "1" if name == "corner_force" else "1/mm", weight=weight
-        )
+            name, "effect", CauseKind.FORCE, size, unit, weight=weight, positive=name == "engagement"
+        )  # a force falls where the tool leaves, and never rises
         one = CausePrediction(points, model, (*prediction.causes, cause))
         columns = _own_columns(one, np.append(x, 0.0), 1) * size
         found.append(MissingEffect(name, (cause,), model, columns, transfers=True))

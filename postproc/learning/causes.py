@@ -58,7 +58,8 @@ class CauseKind(Enum):
 class Cause:
     """``name``; ``group``: robot, force, tool, base or effect; ``deviation``: before the measurement; ``unit``: "1" for
     a share.  ``term``, ``parameter`` and ``value``: of the model.  ``weight`` (K,): how much of it acts at each point,
-    of SHIFT the whole column [m].  ``place``: operation or tool that it belongs to."""
+    of SHIFT the whole column [m].  ``place``: operation or tool that it belongs to;
+    ``positive``: it has no negative values."""
 
     name: str
     group: str
@@ -70,6 +71,7 @@ class Cause:
     value: float = 0.0
     weight: Floats = field(default_factory=lambda: np.zeros(0))
     place: str = ""
+    positive: bool = False
 
     def part(self, rows: Ints) -> Cause:
         """The cause of some points (J,)."""
@@ -189,7 +191,7 @@ class CausePrediction:
         low, high = x.copy(), x.copy()
         low[number] -= STEP * cause.deviation
         high[number] += STEP * cause.deviation
-        if cause.kind is CauseKind.VALUE:  # no bound is passed
+        if cause.positive:  # no bound is passed
             low[number] = max(low[number], 0.0)
         ends = [self.points.errors(self.model_at(one), scale, turn, self._sides) for one in (low, high)]
         return np.asarray((ends[1] - ends[0]) / (high[number] - low[number]))
@@ -197,7 +199,7 @@ class CausePrediction:
     def bounded(self, x: Floats) -> Floats:
         """(P,) ``x`` (P,) within what can be meant."""
         most = np.array([MOST if c.is_share() else np.inf for c in self.causes])
-        least = np.array([0.0 if c.kind is CauseKind.VALUE else -np.inf for c in self.causes])
+        least = np.array([0.0 if c.positive else -np.inf for c in self.causes])
         return np.asarray(np.clip(x, np.maximum(-most, least), most))
 
 

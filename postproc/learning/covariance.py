@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from postproc.base.arrays import Floats, Ints
 from postproc.base.units import MM
@@ -124,6 +124,10 @@ class Explanation:
         lower, below = cho_factor(whole, lower=True, check_finite=False)
         return np.asarray(lower), bool(below)
 
+    def whiten(self, values: Floats) -> Floats:
+        """(K, ...) L^-1 of ``values`` (K, ...), with K = L L^T."""
+        return np.asarray(solve_triangular(self.factor[0], values, lower=True, check_finite=False))
+
     @cached_property
     def alpha(self) -> Floats:
         """(K,) K^-1 rest."""
@@ -134,7 +138,7 @@ class Explanation:
         """(K, K) K^-1."""
         return np.asarray(cho_solve(self.factor, np.eye(len(self.rest)), check_finite=False))
 
-    @property
+    @cached_property
     def evidence(self) -> float:
         """Logarithm of the probability of the deviations, and of the surface before them."""
         logarithm = 2 * float(np.log(np.diag(self.factor[0])).sum())
@@ -187,6 +191,13 @@ def choose_surface(explained: Explanation, rounds: int = 2) -> Explanation:
         if best.surface == before:
             break
     return best
+
+
+def without_field(explained: Explanation) -> Explanation:
+    """The greatest evidence without a smooth error."""
+    length = explained.surface.length
+    every = [explained.with_surface(SmoothField(0.0, length, float(white))) for white in WHITES]
+    return max(every, key=lambda one: one.evidence)
 
 
 def _better(best: Explanation, surface: SmoothField) -> Explanation:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from postproc.base.arrays import Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.geometry import Poses, turned
 from postproc.base.units import MM
 from postproc.compensation.desired_path import DesiredPath
@@ -212,18 +212,20 @@ class FeedTurns:
     length: Floats
 
     @staticmethod
-    def of(path: DesiredPath, toolpath: Toolpath) -> FeedTurns:
-        """Of a program: vertices, and arcs by their whole angle at their middle."""
+    def of(path: DesiredPath, toolpath: Toolpath, cuts: Bools) -> FeedTurns:
+        """Of a program: vertices between motions that both cut, and arcs by their whole angle at their middle; cuts
+        (N,)."""
         count = len(toolpath)
         rows = np.arange(count)
         first, last = path.tangent(rows, np.zeros(count)), path.tangent(rows, np.ones(count))
         known = (np.abs(first).sum(axis=1) > 0) & (np.abs(last).sum(axis=1) > 0)
+        known &= cuts
         linked = known & np.append(False, known[:-1]) & toolpath.continues
         cosine = np.clip(np.sum(first * np.roll(last, 1, axis=0), axis=1), -1.0, 1.0)
         turn = np.where(linked, np.arccos(cosine), 0.0)
         end = np.cumsum(np.maximum(path.length, 1e-6 * MM))
         start = np.append(0.0, end[:-1])
-        sweep = np.minimum(np.abs(np.nan_to_num(path.sweep)), np.pi)
+        sweep = np.where(cuts, np.minimum(np.abs(np.nan_to_num(path.sweep)), np.pi), 0.0)
         station = np.stack([start, 0.5 * (start + end)], axis=1).ravel()
         turned = np.cumsum(np.stack([turn, sweep], axis=1).ravel())
         ends = np.stack([station - ROUNDED, station + ROUNDED], axis=1).ravel()

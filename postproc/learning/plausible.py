@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations, islice
+
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats
@@ -10,10 +14,20 @@ from postproc.base.units import MM
 from postproc.learning.attribution import Attribution
 from postproc.learning.causes import CauseKind, CausePrediction
 from postproc.learning.covariance import FIELDS, WHITES, Explanation, Layout, SmoothField, choose_surface
+from postproc.learning.excluded_points import MOST_OUTLIERS, OUTLIERS_EACH, find_outliers
 from postproc.learning.measured_part import MeasuredPart
 
 LIKELIER = 3.0
 """Logarithm: how much likelier the deviations must be with the other sign."""
+
+EXCHANGED, MOST_PAIRS = 10.0, 60
+"""The same if the deviations of two features are exchanged; pairs that are tried."""
+
+OFFSET = 0.1 * MM
+"""[m] An offset of all deviations that no tool has."""
+
+QUIET, FEW = 0.5, 12
+"""Deviations of so many times the stated scatter are too small; fewer points tell nothing of it."""
 
 FAR_OUT = 5.0
 """Standard deviations before the measurement beyond which a cause is no longer one."""
@@ -31,31 +45,112 @@ TOUCHED = 0.75
 """Share of points that tools of the program have to touch."""
 
 
-def check_sign(prediction: CausePrediction, deviation: Floats, layout: Layout, file: str) -> list[Finding]:
-    """Whether the deviations (K,) [m] are far likelier with the other sign."""
-    mean, root = prediction.before
-    columns, errors = prediction.columns(mean), prediction.errors(mean)
-    scaled = columns @ root
-    by_force = next(
-        (columns[:, i] for i, cause in enumerate(prediction.causes) if cause.name == "force"), 0 * errors
-    )
-    likely = [
-        choose_surface(
-            Explanation(layout, SmoothField(), sign * deviation - errors, scaled, by_force), 1
-        ).evidence
-        for sign in (1.0, -1.0)
-    ]
-    if likely[1] - likely[0] <= LIKELIER:
+@dataclass(frozen=True, eq=False)
+class FirstLook:
+    """Deviations (K,) [m] beside what the causes predict before anything is learnt: ``errors`` (K,) [m], ``columns``
+    (K, P) [m per standard deviation], ``by_force`` (K,) [m per share of the force]."""
+
+    layout: Layout
+    deviation: Floats
+    errors: Floats
+    columns: Floats
+    by_force: Floats
+
+    @staticmethod
+    def of(prediction: CausePrediction, deviation: Floats, layout: Layout) -> FirstLook:
+        """Of deviations (K,) [m]."""
+        mean, root = prediction.before
+        columns, errors = prediction.columns(mean), prediction.errors(mean)
+        names = [cause.name for cause in prediction.causes]
+        by_force = columns[:, names.index("force")] if "force" in names else np.zeros(len(errors))
+        return FirstLook(layout, deviation, errors, columns @ root, by_force)
+
+    def evidence(self, deviation: Floats, errors: Floats) -> float:
+        """Logarithm of the probability of deviations (K,) [m] where the program makes errors (K,) [m]."""
+        whole = Explanation(self.layout, SmoothField(), deviation - errors, self.columns, self.by_force)
+        return choose_surface(whole, 1).evidence
+
+    def robust_evidence(self, deviation: Floats) -> float:
+        """The same of deviations (K,) [m] with their outliers excluded, each at its cost."""
+        whole = Explanation(self.layout, SmoothField(), deviation - self.errors, self.columns, self.by_force)
+        out = find_outliers(whole, int(MOST_OUTLIERS * len(deviation)))
+        inside = np.setdiff1d(np.arange(len(deviation)), out)
+        return choose_surface(whole.part(inside), 1).evidence + OUTLIERS_EACH * len(out)
+
+
+def check_deviations(look: FirstLook, feature: Sequence[str], original: bool, file: str) -> list[Finding]:
+    """Whether the deviations are too small for the probe, or far likelier with the other sign, exchanged between two of
+    the features (K,), or of a compensated program where the ``original`` is stated."""
+    quiet = _check_size(look, file)
+    if quiet:
+        return quiet
+    present = look.evidence(look.deviation, look.errors)
+    turned = look.evidence(-look.deviation, look.errors) - present
+    compensated = look.evidence(look.deviation, 0 * look.errors) - present if original else -np.inf
+    if compensated > max(0.0, turned):
+        message = (
+            "the deviations are likelier of a compensated program than of the original, which the file states"
+        )
+        help = "state the program that really ran: `# cut_with: compensated/part.src`, and its sha256"
+        return [Finding("LRN002", message, file, help=help)]
+    if turned > LIKELIER:
+        message = (
+            f"the deviations are exp({turned:.0f}) times likelier with the other sign: probably they"
+            " count what is missing as positive, or the reverse"
+        )
+        help = "check the line `# positive:` against a place that was cut too deep"
+        return [Finding("LRN004", message, file, help=help)]
+    return _check_offset(look, present, file) or _check_features(look, feature, present, file)
+
+
+def _check_size(look: FirstLook, file: str) -> list[Finding]:
+    """Whether the deviations scatter less than the probe, which no part can."""
+    layout = look.layout
+    taken = np.linalg.qr(layout.free[:, np.abs(layout.free).any(axis=0)])[0]
+    aligned = look.deviation - taken @ (taken.T @ look.deviation)
+    free = len(aligned) - taken.shape[1]
+    size = float(np.sqrt(np.sum((aligned / layout.sigma) ** 2) / max(free, 1)))
+    if free < FEW or size >= QUIET:
+        return []
+    rms = float(np.sqrt(np.mean(aligned**2))) / MM
+    message = f"the deviations are {rms:.4f} mm RMS, {size:.1g} times the stated scatter of the probe"
+    help = "DEV is in mm (not in inches or m); sigma_mm is the standard deviation of one deviation"
+    return [Finding("LRN004", message, file, help=help)]
+
+
+def _check_offset(look: FirstLook, present: float, file: str) -> list[Finding]:
+    """Whether all deviations are too large by the same, as with the radius of the probe in them."""
+    middle = float(np.median(look.deviation - look.errors))
+    if abs(middle) < OFFSET or look.evidence(look.deviation - middle, look.errors) - present < EXCHANGED:
+        return []
+    message = f"the deviations are far likelier if {middle / MM:.2f} mm are taken off all of them"
+    help = "the radius of the probe is probably still in DEV: let its software remove it"
+    return [Finding("LRN004", message, file, help=help)]
+
+
+def _check_features(look: FirstLook, feature: Sequence[str], present: float, file: str) -> list[Finding]:
+    names = sorted({name for name in feature if name})
+    rows = {name: np.array([i for i, one in enumerate(feature) if one == name]) for name in names}
+    best, pair, likeliest = 0.0, ("", ""), look.deviation
+    for one, other in islice(combinations(names, 2), MOST_PAIRS):
+        count = min(len(rows[one]), len(rows[other]))
+        first, second = rows[one][:count], rows[other][:count]
+        exchanged = look.deviation.copy()
+        exchanged[first], exchanged[second] = look.deviation[second], look.deviation[first]
+        gain = look.evidence(exchanged, look.errors) - present
+        if gain > best:
+            best, pair, likeliest = gain, (one, other), exchanged
+    if best <= EXCHANGED:
+        return []
+    # single points that are far off, as in corners, may like another place better
+    best = look.robust_evidence(likeliest) - look.robust_evidence(look.deviation)
+    if best <= EXCHANGED:
         return []
     message = (
-        f"the deviations are exp({likely[1] - likely[0]:.0f}) times likelier with the other sign: probably they"
-        " count what is missing as positive, or the reverse"
+        f"the deviations are exp({best:.0f}) times likelier if those of {pair[0]} and {pair[1]} are exchanged"
     )
-    return [
-        Finding(
-            "LRN004", message, file, help="check the line `# positive:` against a place that was cut too deep"
-        )
-    ]
+    help = "check which rows of the measuring report belong to which feature"
+    return [Finding("LRN004", message, file, help=help)]
 
 
 def check_nominal(part: MeasuredPart, distance: Floats) -> list[Finding]:

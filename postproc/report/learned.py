@@ -118,6 +118,7 @@ class Learned(Result):
                 {"effect": one.name, "likelihood_gain": round(one.gain, 3)}
                 for one in result.rivals[:MOST_RIVALS]
             ],
+            "ambiguous": list(result.alternatives),
             "causes": [cause_entry(cause, value, width) for cause, value, width in self.causes()],
             "unobserved": list(unobserved(result)),
             "products": [
@@ -146,9 +147,11 @@ class Learned(Result):
         return complete_result("learn", answer)
 
     def causes(self) -> list[tuple[Cause, float, float]]:
-        """Each cause with its value and its standard deviation after the measurement."""
+        """Each cause with its value and its standard deviation after the measurement, but those of an effect that the
+        part does not tell from others."""
         result = self.attribution
-        return list(zip(result.causes, result.x.tolist(), result.deviations.tolist(), strict=True))
+        every = zip(result.causes, result.x.tolist(), result.deviations.tolist(), strict=True)
+        return [one for one in every if not result.is_unsure(one[0])]
 
 
 def _part_entry(one: LearnedPart) -> dict[str, object]:

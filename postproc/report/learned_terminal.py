@@ -18,17 +18,23 @@ WORDS = {
     "nothing_missing": "the known causes explain this part",
     "named": "the known causes and {named} explain this part",
     "partly_named": "{named} is a cause; a part of the error has no name",
-    "ambiguous": "several effects explain a part of the error about as well: {rivals}",
+    "ambiguous": "one of several effects explains a part of the error: {alternatives}",
     "unknown": "a smooth part of the error has no name",
 }
+
+
+MOST_ALTERNATIVES = 4
+NOTHING = 1e-3
+"""Share of its standard deviation below which a value is shown as 0."""
 
 
 def headline(learned: Learned) -> str:
     """The verdict in words."""
     result = learned.attribution
     named = " and ".join(one.name for one in result.named)
-    rivals = ", ".join(one.name for one in result.rivals[:2])
-    return WORDS[result.verdict].format(named=named, rivals=rivals)
+    shown, others = result.alternatives[:MOST_ALTERNATIVES], result.alternatives[MOST_ALTERNATIVES:]
+    alternatives = " or ".join(shown) + (f" or {len(others)} more" if others else "")
+    return WORDS[result.verdict].format(named=named, alternatives=alternatives)
 
 
 def show_learned(console: Console, learned: Learned, verbose: bool = False) -> None:
@@ -84,7 +90,8 @@ def _causes(learned: Learned, verbose: bool) -> Table:
             turned = cause.unit == "rad" and cause.group == "force"
             if cause.group != group or (turned and not verbose):
                 continue
-            entry = cause_entry(cause, value, deviation)
+            nothing = not cause.is_share() and abs(value) < NOTHING * deviation
+            entry = cause_entry(cause, 0.0 if nothing else value, deviation)
             unit = "x" if entry["unit"] == "1" else f" {entry['unit']}"
             before = (
                 f"1 +- {entry['before_ci95']:.2f}"

@@ -66,6 +66,7 @@ def learn_schema() -> Schema:
             "alternatives": array(
                 record(likelier, "one effect"), "effects that are not named, the likeliest first"
             ),
+            "ambiguous": array(word("name of the effect"), "effects that the points can not distinguish"),
             "causes": array(record(cause, "one cause"), "causes with what the part says of them"),
             "unobserved": array(word("name of the cause"), "causes that keep what was known before"),
             "products": array(record(product, "one pair"), "pairs of which only the product is known"),

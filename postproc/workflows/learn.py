@@ -19,7 +19,7 @@ from postproc.learning.causes import CausePrediction, PriorKnowledge
 from postproc.learning.history import RecordedStep
 from postproc.learning.measured_part import MeasuredPart, read_measured_part
 from postproc.learning.next_program import force_factors, learned_error
-from postproc.learning.plausible import check_explained, check_sign
+from postproc.learning.plausible import FirstLook, check_deviations, check_explained
 from postproc.learning.promise import Promise, measured_rms, promise
 from postproc.learning.push_test import with_push_test
 from postproc.learning.unobserved import indistinct
@@ -80,7 +80,9 @@ def learn(request: LearnRequest, stage: Stage = silent) -> Learned:
         joints = [(joint.name, joint.kind != "revolute") for joint in job.ready.robot.joints]
         prediction = with_push_test(prediction, read_measurements(request.push, joints))
     file = str(parts[0].file)
-    wrong = check_sign(prediction, matched.deviation, matched.layout, file)
+    look = FirstLook.of(prediction, matched.deviation, matched.layout)
+    original = not any(part.cut_with for part in parts)
+    wrong = check_deviations(look, matched.feature, original, file)
     if wrong:
         raise Refusal(*wrong)
     stage("attributing")
@@ -194,13 +196,9 @@ def _findings(
         findings.append(
             Finding("LRN012", f"{one.name} is named: exp({one.gain:.1f}) times likelier than without", file)
         )
-    if (
-        result.verdict in ("ambiguous", "partly_named")
-        and len(result.rivals) > 1
-        and result.rivals[0].gain > 4.6
-    ):
-        names = " and ".join(one.name for one in result.rivals[:2])
-        findings.append(Finding("LRN013", f"{names} explain the rest about as well", file))
+    if result.alternatives:
+        names = ", ".join(result.alternatives)
+        findings.append(Finding("LRN013", f"{names}: the points can not distinguish these effects", file))
     if result.verdict in ("unknown", "partly_named") and result.surface.size > 0:
         size = float(np.sqrt(np.mean(result.by_field**2)))
         message = f"a smooth error of {size / MM:.3f} mm RMS has no name; it is corrected at this place only"
@@ -260,8 +258,8 @@ def _published(
     _spare(request, job, parts, [*files, own, *extra, remembered.path])
     applied = result.damped(request.gain)
     inputs = _learned_inputs(job, matched, applied)
-    if content is not None:
-        acting = learned_robot_file(applied, robot, parts, gap, robot_path) or content
+    acting = learned_robot_file(applied, robot, parts, gap, robot_path, at_this_place=True) or content
+    if acting is not None:
         inputs = replace(inputs, robot=robot_of(acting, robot_path))
     following = folder / main.program.name
     if not request.dry_run:

@@ -139,7 +139,7 @@ def read_job(request: Request) -> CutProgram:
         operations_of(cell, ready.wrenches, path),
         numbers,
         np.nan_to_num(frames.spindle_in_tool[np.arange(len(path))]),
-        FeedTurns.of(desired, path),
+        FeedTurns.of(desired, path, task.carries),
         radius,
         time / max(float(time[-1]), 1e-9),
         motions,

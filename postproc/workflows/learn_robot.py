@@ -28,15 +28,22 @@ def is_observed(cause: Cause, value: float, deviation: float) -> bool:
 
 
 def learned_robot_file(
-    result: Attribution, robot: Robot, parts: Sequence[MeasuredPart], gap: dict[str, float], destination: Path
+    result: Attribution,
+    robot: Robot,
+    parts: Sequence[MeasuredPart],
+    gap: dict[str, float],
+    destination: Path,
+    at_this_place: bool = False,
 ) -> bytes | None:
     """The bytes of ``destination``: the file of ``robot`` with what was learnt of its parameters, intervals and
-    correlations; None where nothing was."""
+    correlations; None where nothing was; ``at_this_place``: with an effect that is not told from others."""
     kinds = (CauseKind.SHARE, CauseKind.VALUE)
     numbers = [
         i
         for i, cause in enumerate(result.causes)
-        if cause.kind in kinds and is_observed(cause, float(result.x[i]), float(result.deviations[i]))
+        if cause.kind in kinds
+        and is_observed(cause, float(result.x[i]), float(result.deviations[i]))
+        and (at_this_place or not result.is_unsure(cause))
     ]
     if not numbers:
         return None

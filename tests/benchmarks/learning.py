@@ -11,11 +11,14 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import os
 import resource
 import sys
 import tempfile
 import time
 from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is there
 
 import numpy as np
 
@@ -113,7 +116,7 @@ def main() -> None:
         from postproc.workflows.learn import LearnRequest, learn
         from postproc.workflows.preparation import Request
 
-        done = learn(LearnRequest(Request(folder / "part.src", force=""), (measured,), dry_run=True), stage)
+        done = learn(LearnRequest(Request(folder / "part.src", force=""), (measured,)), stage)
         whole = time.process_time() - start
         used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
         motions = len((folder / "part.src").read_text().splitlines())

@@ -13,4 +13,6 @@ CSV of the part, and writes the next program, which the plant cuts; the truth st
     worker    the process that learns
     rows      the rows of the table, and one draw of each
     table     figures with 95 % intervals
+    visible   how much a hidden effect shows in the deviations
+    bad_files files with a mistake, of which none may be learnt from
 """

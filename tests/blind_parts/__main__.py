@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 
 def main() -> int:
-    from blind_parts.rows import OPTIONS, Learner, draw, prepare_shops
+    from blind_parts.rows import OPTIONS, RARE, Learner, draw, prepare_shops
     from blind_parts.table import lines_of
 
     parser = argparse.ArgumentParser()
@@ -36,6 +36,8 @@ def main() -> int:
         learner = Learner()
         for number in range(chosen.draws):
             for row in chosen.rows.split(","):
+                if row in RARE and number % 3 and chosen.rows.count(","):
+                    continue
                 answer = draw(row, chosen.seed + number, shops, learner)
                 answers.append(answer)
                 if chosen.out is not None:

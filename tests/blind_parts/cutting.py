@@ -5,9 +5,10 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
+from weakref import WeakKeyDictionary
 
 import numpy as np
-from plant import Plant
+from plant import Plant, Rest
 
 from postproc.base.geometry import Poses
 from postproc.effects import Conditions
@@ -87,6 +88,7 @@ def cut(
     corner = _corners(surface)
     sense = _senses(surface, np.maximum(truth.hardware.width, truth.hardware.gap))
     tcp = task.tool[surface.row]
+    goals = _goals(surface, plant, states.q_goal, tcp)
     for k in range(len(point)):
         name = job.operations.names[job.operations.which[surface.row[k]]]
         scale = truth.factor[name] * scatter[name] * (1 + truth.corner * corner[k])
@@ -95,7 +97,7 @@ def cut(
         came = Conditions(direction=sense[k][None])
         tool = Poses(tcp.rotation[k], tcp.position[k])
         loaded = plant.rest(states.q[k], force, tool, came)
-        still = plant.rest(states.q_goal[k], np.zeros(6), tool, Conditions(direction=0 * sense[k][None]))
+        still = goals[k]
         lever = tool.rotation.T @ (states.tool.position[k] - tool.position)
         shift = loaded.position - still.position + (loaded.rotation - still.rotation) @ lever
         spindle = states.spindle[k]
@@ -105,6 +107,20 @@ def cut(
             normal[k] @ (shift + wave) + truth.length * along - truth.radius * np.sqrt(max(1 - along**2, 0.0))
         )
     return errors
+
+
+_GOALS: WeakKeyDictionary[Plant, tuple[Surface, list[Rest]]] = WeakKeyDictionary()
+"""Where a plant without force takes the tool; the same for every part that it cuts."""
+
+
+def _goals(surface: Surface, plant: Plant, q: np.ndarray, tcp: Poses) -> list[Rest]:
+    known = _GOALS.get(plant)
+    if known is None or known[0] is not surface:
+        middle = Conditions(direction=np.zeros((1, q.shape[1])))
+        tools = [Poses(tcp.rotation[k], tcp.position[k]) for k in range(len(q))]
+        known = surface, [plant.rest(q[k], np.zeros(6), tool, middle) for k, tool in enumerate(tools)]
+        _GOALS[plant] = known
+    return known[1]
 
 
 _WAVES = np.array([[1.0, 0.4, 0.0], [-0.3, 1.0, 0.0], [0.7, 0.7, 0.0]]) * 2 * np.pi / 400.0

@@ -19,8 +19,8 @@ from postproc.learning.touched_points import touched_points
 from .cutting import Surface, aligned_rms, cut, probe, surface_of, write_csv
 from .mirrors import interpolated, smoothed
 from .shop import AWAY, surface_points, write_shop
-from .truth import HIDDEN, draw_forces, draw_truth
-from .visible import visible_gain
+from .truth import HIDDEN, Truth, draw_forces, draw_truth, filed_compliances
+from .visible import visible
 
 POINTS = 140
 """Points of the surface at which parts are compared; the measured ones are some of them, or more are drawn."""
@@ -29,7 +29,7 @@ NOISE = 1e-5
 OPTIONS: dict[str, dict[str, Any]] = {
     "same20": {"count": 20},
     "same50": {"count": 50},
-    "same100": {"count": 100},
+    "same100": {"count": 100, "place": True},
     "planned30": {"count": 30, "planned": True},
     "same30": {"count": 30},
     "same300": {"count": 300},
@@ -37,17 +37,20 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "noise06": {"count": 100, "noise": 6e-5},
     "outliers": {"count": 100, "outliers": 0.03},
     "smooth": {"count": 100, "smooth": 3e-5},
-    "place": {"count": 100, "place": True},
     "other": {"count": 100, "other": True},
     "third": {"count": 60, "parts": 4},
     "half": {"count": 60, "gain": 0.5},
     **{name: {"count": 120, "hidden": (name,)} for name in HIDDEN},
     "two": {"count": 120, "hidden": 2},
-    "sign": {"count": 100, "wrong": "sign"},
-    "swapped": {"count": 100, "wrong": "swapped"},
-    "program": {"count": 100, "wrong": "program"},
-    "radius": {"count": 100, "wrong": "radius"},
+    "worn_hysteresis": {"count": 120, "hidden": ("hysteresis",), "worn": 4.0},
+    "worn_backlash": {"count": 120, "hidden": ("backlash",), "worn": 4.0},
 }
+
+
+RARE = (
+    "same30", "same300", "noise03", "noise06", "smooth", "other", "half", "base", "radial", "two",
+)  # fmt: skip
+"""Rows that are drawn every third time only."""
 
 
 class Learner:
@@ -105,15 +108,15 @@ def draw(row: str, seed: int, shops: tuple[Path, Path], learner: Learner) -> dic
     hidden = options.get("hidden", ())
     if hidden == 2:
         hidden = tuple(rng.choice(HIDDEN, 2, replace=False).tolist())
-    truth = draw_truth(rng, operations, hidden, options.get("smooth", 0.0))
+    truth = draw_truth(rng, operations, hidden, options.get("smooth", 0.0), options.get("worn", 1.0))
     plant = truth.plant()
     shop = home.folder
     first = shop / "compensated" / "part.src"
-    programs: list[Path] = [shop / "part.src" if options.get("wrong") == "sign" else first]
+    programs: list[Path] = [first]
     chosen = rng.choice(total, count, replace=False)
     if options.get("planned"):
         chosen = _planned(home, count)
-    before = cut(home, truth, plant, None if programs[0].parent == shop else programs[0], rng)
+    before = cut(home, truth, plant, first, rng)
     answer: dict[str, Any] = {
         "row": row,
         "seed": seed,
@@ -124,24 +127,19 @@ def draw(row: str, seed: int, shops: tuple[Path, Path], learner: Learner) -> dic
     if "outliers" in options:
         bad = rng.choice(count, max(1, round(options["outliers"] * count)), replace=False)
         deviation[bad] += 0.3e-3 * rng.choice([-1.0, 1.0], len(bad))
-    written = _spoilt(options.get("wrong", ""), deviation, home, chosen, rng)
     name = f"{row}.csv"
-    write_csv(shop / name, home, chosen, written, programs[0], noise)
-    if options.get("wrong") == "program":
-        text = (shop / name).read_text().splitlines()
-        text[3] = "# sha256: " + "0123456789ab" * 4
-        (shop / name).write_text("\n".join(text) + "\n")
+    write_csv(shop / name, home, chosen, deviation, first, noise)
     out = f"learned_{row}"
     shutil.rmtree(shop / out, ignore_errors=True)
     asked = {"gain": options.get("gain", 1.0), "new_history": True}
     told = learner.ask(shop, [name], out, **asked)
     answer |= told
     if hidden:
-        answer["visible"] = visible_gain(home, truth, programs[0], shop / name, chosen)
-    if not told["refused"]:
-        answer["covered"] = _covered(told["causes"], truth)
-    if told["refused"] or "wrong" in options:
+        seen = visible(home, truth, programs[0], shop / name, chosen)
+        answer |= {"labels": list(truth.names()), "visible": seen.gain, "ahead": seen.ahead}
+    if told["refused"]:
         return answer
+    answer["covered"] = _covered(told, truth)
     measured = [name]
     after, parts = before, []
     for number in range(2, options.get("parts", 2) + 1):
@@ -182,34 +180,27 @@ def _planned(home: Surface, count: int) -> np.ndarray:
     return np.argmin(((places[:, None] - home.point[None]) ** 2).sum(axis=2), axis=1)
 
 
-def _covered(causes: dict[str, list[float]], truth: Any) -> list[int]:
-    """Whether the true compliances and dimensions of the tool lie in their intervals; a force of an operation is
-    the sum of two causes, of which no interval is stated."""
-    from .truth import filed_compliances
-
-    true = {
+def _covered(told: dict[str, Any], truth: Truth) -> dict[str, list[int]]:
+    """Kind of value -> whether the true ones lie in their intervals."""
+    compliances = {
         f"joint_compliance.c{i}": float(np.log(c / filed))
         for i, (c, filed) in enumerate(zip(truth.compliance, filed_compliances(), strict=True), 1)
     }
-    true |= {
-        "gravity_compensator.K_c": float(np.log(truth.spring)),
-        "radius of tool 1": truth.radius,
-        "length of tool 1": truth.length,
+    kinds = {
+        "compliances of joints": (told["causes"], compliances),
+        "balancer": (told["causes"], {"gravity_compensator.K_c": float(np.log(truth.spring))}),
+        "tool": (told["causes"], {"radius of tool 1": truth.radius, "length of tool 1": truth.length}),
+        "forces of operations": (told["forces"], {n: float(np.log(f)) for n, f in truth.factor.items()}),
+        "named effects": (told["sizes"], truth.names()),
     }
-    found = [(causes[name], value) for name, value in true.items() if name in causes]
-    return [int(abs(mean - value) <= 1.96 * deviation) for (mean, deviation), value in found]
-
-
-def _spoilt(
-    how: str, deviation: np.ndarray, home: Surface, chosen: np.ndarray, rng: np.random.Generator
-) -> np.ndarray:
-    if how == "sign":
-        return -deviation
-    if how == "radius":
-        return deviation + 1e-3
-    if how == "swapped":
-        return np.roll(deviation, len(deviation) // 3)
-    return deviation
+    return {
+        kind: [
+            int(abs(found[name][0] - value) <= 1.96 * found[name][1])
+            for name, value in true.items()
+            if name in found and np.isfinite(value)
+        ]
+        for kind, (found, true) in kinds.items()
+    }
 
 
 def _others(

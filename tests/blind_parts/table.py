@@ -9,8 +9,9 @@ import numpy as np
 
 SAMPLES = 2000
 
-TELLING = float(np.log(100.0))
-"""An effect can be identified where the truth itself would be so much likelier (logarithm)."""
+TELLING, AHEAD = float(np.log(100.0)), float(np.log(19.0))
+"""An effect shows where the truth itself makes the deviations so much likelier, and can be named where it makes them so
+much likelier than any other effect does (logarithms)."""
 
 
 def percent(value: float) -> str:
@@ -35,19 +36,6 @@ def share_interval(count: int, of: int) -> str:
     middle, half = p + z * z / (2 * of), z * np.sqrt(p * (1 - p) / of + z * z / (4 * of * of))
     low, high = ((middle + sign * half) / (1 + z * z / of) for sign in (-1, 1))
     return f"{percent(p)} ({percent(max(low, 0.0))}..{percent(high)})"
-
-
-NAMES = {
-    "hysteresis": "hysteresis",
-    "backlash": "backlash",
-    "corner_force": "corner_force",
-    "base": "base_compliance",
-    "radial": "tool_compliance",
-}
-
-
-def right_name(named: str, hidden: Sequence[str]) -> bool:
-    return any(named.startswith(NAMES[one]) for one in hidden)
 
 
 def lines_of(answers: Sequence[dict[str, Any]]) -> list[str]:
@@ -119,47 +107,72 @@ def _parts(answers: Sequence[dict[str, Any]]) -> list[str]:
     return text
 
 
-def _kind(name: str) -> str:
-    """The effect of a name, without its joint."""
-    return next((one for one, effect in NAMES.items() if name.startswith(effect)), name)
+HEADS = (
+    "hysteresis",
+    "backlash",
+    "corner_force",
+    "base_compliance",
+    "tool_compliance",
+    "engagement",
+    "drift",
+)
 
 
 def _names(answers: Sequence[dict[str, Any]]) -> list[str]:
-    """What is named, by what is hidden: all draws, and those in which it can be identified at all."""
+    """What is named, by what is hidden: all draws, and those in which it can be named at all."""
     seen = [one for one in answers if "named" in one]
-    hidden = dict.fromkeys(tuple(one["hidden"]) for one in seen)
-    heads = [*NAMES, "engagement", "drift"]
+    worn = {one["row"]: "worn: " for one in seen if one["row"].startswith("worn")}
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for one in seen:
+        groups.setdefault(worn.get(one["row"], "") + " and ".join(sorted(one["hidden"])), []).append(one)
     text = [
         "",
-        "| hidden | draws | can be identified % | of these right % | wrong name % of all | ambiguous % | unknown %"
-        " | named: " + " | ".join(heads) + " |",
-        "| --- |" + " --- |" * (6 + len(heads)),
+        "| hidden | draws | shows % | shows, of these named or in the set % | can be named % | of these named %"
+        " | wrong name % of all | one of a set % | of these true % | no name % | named: "
+        + " | ".join(HEADS)
+        + " |",
+        "| --- |" + " --- |" * (9 + len(HEADS)),
     ]
-    for kind in sorted(hidden):
-        own = [one for one in seen if tuple(one["hidden"]) == kind]
-        able = [one for one in own if one.get("visible", 0.0) > TELLING]
-        right = sum(bool(one["named"]) and all(right_name(n, kind) for n in one["named"]) for one in able)
-        wrong = sum(any(not right_name(n, kind) for n in one["named"]) for one in own)
-        names = [{_kind(name) for name in one["named"]} for one in own]
-        verdicts = [sum(one["verdict"] == word for one in own) for word in ("ambiguous", "unknown")]
+    for kind in sorted(groups):
+        own = groups[kind]
+        shows = [one for one in own if one.get("visible", 0.0) > TELLING]
+        able = [one for one in shows if one["ahead"] > AHEAD]
+        sets = [one for one in own if one["alternatives"]]
         cells = [
-            " and ".join(kind) or "nothing",
+            kind or "nothing",
             str(len(own)),
+            share_interval(len(shows), len(own)) if kind else "-",
+            share_interval(sum(_met(one, one["named"] + one["alternatives"]) for one in shows), len(shows)),
             share_interval(len(able), len(own)) if kind else "-",
-            share_interval(right, len(able)),
-            share_interval(wrong, len(own)),
-            *(percent(count / len(own)) for count in verdicts),
-            *(str(sum(head in each for each in names)) for head in heads),
+            share_interval(sum(_met(one, one["named"]) for one in able), len(able)),
+            share_interval(
+                sum(bool(set(one["named"]) - set(one.get("labels", ()))) for one in own), len(own)
+            ),
+            share_interval(len(sets), len(own)),
+            share_interval(sum(_met(one, one["alternatives"]) for one in sets), len(sets)),
+            share_interval(sum(not one["named"] and not one["alternatives"] for one in own), len(own)),
+            *(str(sum(any(n.startswith(head) for n in one["named"]) for one in own)) for head in HEADS),
         ]
         text.append("| " + " | ".join(cells) + " |")
     return text
 
 
+def _met(answer: dict[str, Any], names: Sequence[str]) -> bool:
+    """Whether a hidden effect is among ``names``."""
+    return bool(set(names) & set(answer.get("labels", ())))
+
+
 def _coverage(answers: Sequence[dict[str, Any]]) -> list[str]:
-    inside = [hit for one in answers for hit in one.get("covered", [])]
-    if not inside:
+    """Share of true values in their intervals of 95 %."""
+    hits: dict[str, list[int]] = {}
+    for one in answers:
+        for kind, inside in one.get("covered", {}).items():
+            hits.setdefault(kind, []).extend(inside)
+        if "parts" in one:
+            low, high = one["promise"][2:]
+            hits.setdefault("error of the next part", []).append(int(low <= one["parts"][0] <= high))
+    if not hits:
         return []
-    return [
-        "",
-        f"true values inside of their 95 % intervals: {share_interval(sum(inside), len(inside))} % of {len(inside)}",
-    ]
+    text = ["", "| 95 % interval of | values | true value inside % |", "| --- | --- | --- |"]
+    text += [f"| {kind} | {len(one)} | {share_interval(sum(one), len(one))} |" for kind, one in hits.items()]
+    return text

@@ -36,6 +36,23 @@ class Truth:
     corner: float = 0.0
     wobble: np.ndarray = field(default_factory=lambda: np.zeros((3, 2)))
 
+    def without_hidden(self) -> Truth:
+        """The same robot and process with nothing hidden."""
+        return replace(self, hidden=(), hardware=Hardware(), corner=0.0)
+
+    def names(self) -> dict[str, float]:
+        """Name of each hidden effect, with the true value of a size that the learner estimates, NaN without one."""
+        found = {}
+        for effect, sizes in (("hysteresis", self.hardware.width), ("backlash", self.hardware.gap)):
+            found |= {f"{effect} of A{i + 1}": float(sizes[i]) for i in np.flatnonzero(sizes).tolist()}
+        if self.hardware.base.any():
+            found["base_compliance"] = np.nan
+        if self.hardware.radial:
+            found["tool_compliance"] = np.nan
+        if self.corner:
+            found["corner_force"] = float(np.log1p(self.corner))
+        return found
+
     def plant(self) -> Plant:
         """The arm that MuJoCo bends."""
         robot = kr270()
@@ -62,9 +79,14 @@ def draw_forces(rng: np.random.Generator, operations: list[str]) -> dict[str, An
 
 
 def draw_truth(
-    rng: np.random.Generator, operations: list[str], hidden: tuple[str, ...] = (), smooth: float = 0.0
+    rng: np.random.Generator,
+    operations: list[str],
+    hidden: tuple[str, ...] = (),
+    smooth: float = 0.0,
+    worn: float = 1.0,
 ) -> Truth:
-    """A robot and a process; ``hidden``: of HIDDEN; ``smooth`` [m]: size of a displacement without a name."""
+    """A robot and a process; ``hidden``: of HIDDEN; ``smooth`` [m]: size of a displacement without a name; ``worn``:
+    how many times larger the gaps and loops of the gears are than those of a new one."""
     filed = filed_compliances()
     truth = Truth(
         compliance=filed * rng.uniform(1 - C_OFF, 1 + C_OFF, 6),
@@ -79,10 +101,10 @@ def draw_truth(
         joint = int(rng.integers(3))
         one = np.zeros(6)
         if name == "hysteresis":
-            one[joint] = rng.uniform(3e-5, 8e-5)
+            one[joint] = worn * rng.uniform(3e-5, 8e-5)
             parts["width"] = one
         elif name == "backlash":
-            one[joint] = rng.uniform(3e-5, 8e-5)
+            one[joint] = worn * rng.uniform(3e-5, 8e-5)
             parts["gap"] = one
         elif name == "base":
             one[3:5] = rng.uniform(0.5e-7, 2e-7, 2)

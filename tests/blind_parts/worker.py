@@ -5,8 +5,20 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+
+
+def forces_of(result: Any) -> dict[str, list[float]]:
+    """Operation -> logarithm of the factor of its force, and its standard deviation."""
+    names = [cause.name for cause in result.causes]
+    found = {}
+    for i, cause in enumerate(result.causes):
+        if cause.name.startswith("force of "):
+            pick = np.isin(np.arange(len(names)), [names.index("force"), i]).astype(float)
+            found[cause.place] = [float(pick @ result.x), float(np.sqrt(pick @ result.covariance @ pick))]
+    return found
 
 
 def main() -> None:
@@ -37,6 +49,13 @@ def main() -> None:
             "refused": [],
             "verdict": result.verdict,
             "named": [one.name for one in result.named],
+            "alternatives": list(result.alternatives),
+            "sizes": {
+                cause.place or cause.name: [float(x), float(s)]
+                for cause, x, s in learned.causes()
+                if cause.group == "effect"
+            },
+            "forces": forces_of(result),
             "promise": [
                 learned.promise.before,
                 learned.promise.after,

@@ -1,0 +1,177 @@
+"""Files of measured parts with a mistake in them: how many of them are learnt from.
+
+    python -m tests.blind_parts.bad_files [--draws 20] [--seed 0]
+
+Each draw cuts a part of its own; its file gets one mistake at a time, and one copy gets none.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+import numpy as np
+
+COUNT, NOISE = 100, 1e-5
+HEAD = 6
+"""Lines above the rows."""
+
+Lines = list[str]
+Cells = np.ndarray
+
+
+def _numbers(
+    change: Callable[[Cells, np.random.Generator], None],
+) -> Callable[[Lines, np.random.Generator], Lines]:
+    """A mistake in the columns X, Y, Z, NX, NY, NZ, DEV (K, 7)."""
+
+    def spoil(lines: Lines, rng: np.random.Generator) -> Lines:
+        rows = [line.split(",") for line in lines[HEAD:]]
+        cells = np.array([row[:7] for row in rows], float)
+        change(cells, rng)
+        body = [",".join([*(f"{x:.6f}" for x in own), row[7]]) for own, row in zip(cells, rows, strict=True)]
+        return [*lines[:HEAD], *body]
+
+    return spoil
+
+
+def _columns(one: int, other: int) -> Callable[[Lines, np.random.Generator], Lines]:
+    def change(cells: Cells, rng: np.random.Generator) -> None:
+        cells[:, [one, other]] = cells[:, [other, one]]
+
+    return _numbers(change)
+
+
+def _scaled(columns: list[int], factor: float) -> Callable[[Lines, np.random.Generator], Lines]:
+    def change(cells: Cells, rng: np.random.Generator) -> None:
+        cells[:, columns] *= factor
+
+    return _numbers(change)
+
+
+def _sign(cells: Cells, rng: np.random.Generator) -> None:
+    cells[:, 6] *= -1
+
+
+def _shuffled(cells: Cells, rng: np.random.Generator) -> None:
+    cells[:, 6] = rng.permutation(cells[:, 6])
+
+
+def _shifted(cells: Cells, rng: np.random.Generator) -> None:
+    cells[:, 6] = np.roll(cells[:, 6], 1)
+
+
+def _radius(cells: Cells, rng: np.random.Generator) -> None:
+    cells[:, 6] += rng.choice([0.5, 1.0, 2.0])
+
+
+def _actual(cells: Cells, rng: np.random.Generator) -> None:
+    cells[:, :3] += cells[:, 6:] * cells[:, 3:6]
+
+
+def _features(lines: Lines, rng: np.random.Generator) -> Lines:
+    """The deviations of two features are exchanged as far as there are points."""
+    rows = [line.split(",") for line in lines[HEAD:]]
+    names = sorted({row[7] for row in rows if row[7].startswith("WALL")})
+    first, second = rng.choice(names, 2, replace=False)
+    one, other = ([i for i, row in enumerate(rows) if row[7] == name] for name in (first, second))
+    for i, j in zip(one, other, strict=False):
+        rows[i][6], rows[j][6] = rows[j][6], rows[i][6]
+    return [*lines[:HEAD], *(",".join(row) for row in rows)]
+
+
+def _digest(lines: Lines, rng: np.random.Generator) -> Lines:
+    return [*lines[:3], "# sha256: " + hashlib.sha256(rng.bytes(8)).hexdigest(), *lines[4:]]
+
+
+GOOD = ("none", "none (by the original)")
+MISTAKES: dict[str, Callable[[Lines, np.random.Generator], Lines]] = {
+    **dict.fromkeys(GOOD, lambda lines, rng: lines),
+    "sign": _numbers(_sign),
+    "columns X and Y": _columns(0, 1),
+    "columns NX and NY": _columns(3, 4),
+    "features exchanged": _features,
+    "rows shuffled": _numbers(_shuffled),
+    "rows shifted by one": _numbers(_shifted),
+    "another program": _digest,
+    "the original named": lambda lines, rng: lines,
+    "deviations in m": _scaled([6], 1e-3),
+    "all in m": _scaled([0, 1, 2, 6], 1e-3),
+    "deviations in inches": _scaled([6], 1 / 25.4),
+    "all in inches": _scaled([0, 1, 2, 6], 1 / 25.4),
+    "radius of the probe": _numbers(_radius),
+    "actual for nominal": _numbers(_actual),
+}
+"""A wrong sign is that of a part of the uncompensated program: on a well compensated one either sign is as likely."""
+
+
+def main() -> None:
+    from blind_parts.cutting import cut, probe, surface_of, write_csv
+    from blind_parts.shop import surface_points, write_shop
+    from blind_parts.table import share_interval
+    from blind_parts.truth import draw_truth
+    from postproc.base.findings import Refusal
+    from postproc.workflows.learn import LearnRequest, learn
+    from postproc.workflows.preparation import Request
+    from postproc.workflows.program import compensate
+
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--draws", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", default=",".join(MISTAKES))
+    parser.add_argument("--details", action="store_true")
+    chosen = parser.parse_args()
+    codes: dict[str, list[str]] = {name: [] for name in chosen.only.split(",")}
+    with tempfile.TemporaryDirectory() as name:
+        original = write_shop(Path(name) / "shop")
+        shop, compensated = original.parent, original.parent / "compensated" / "part.src"
+        compensate(Request(original, force=""))
+        for number in range(chosen.draws):
+            rng = np.random.default_rng([chosen.seed + number, 31])
+            surface = surface_of(shop, *surface_points(COUNT, rng))
+            operations = [one for one in surface.program.operations.names if one != "tool 1"]
+            truth = draw_truth(rng, operations)
+            plant, every = truth.plant(), np.arange(COUNT)
+            read = {
+                program: probe(surface, cut(surface, truth, plant, None if program == original else program, rng),
+                               every, NOISE, rng)
+                for program in (compensated, original)
+            }  # fmt: skip
+            for mistake in codes:
+                cut_by = original if mistake in ("sign", GOOD[1]) else compensated
+                stated = original if mistake == "the original named" else cut_by
+                path = shop / "m.csv"
+                write_csv(path, surface, every, read[cut_by], stated, NOISE)
+                path.write_text("\n".join([*MISTAKES[mistake](path.read_text().splitlines(), rng), ""]))
+                try:
+                    done = learn(LearnRequest(Request(original, force=""), (path,), dry_run=True))
+                    answer = "learnt" if done.promise.better else "nothing written"
+                except Refusal as refusal:
+                    answer = refusal.findings[0].code
+                    if chosen.details:
+                        print(mistake, refusal.findings[0].message[:150])
+                codes[mistake].append(answer)
+    print(
+        "| mistake | files | learnt from % | nothing written | refused by |\n| --- | --- | --- | --- | --- |"
+    )
+    for mistake, answers in codes.items():
+        refused = sorted({one for one in answers if one.startswith("LRN")})
+        learnt = share_interval(answers.count("learnt"), len(answers))
+        print(
+            f"| {mistake} | {len(answers)} | {learnt} | {answers.count('nothing written')} | {', '.join(refused)} |"
+        )
+    wrong = [one for mistake, answers in codes.items() if mistake not in GOOD for one in answers]
+    print(f"\n{wrong.count('learnt')} of {len(wrong)} files with a mistake are learnt from")
+
+
+if __name__ == "__main__":
+    main()
