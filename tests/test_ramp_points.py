@@ -55,7 +55,9 @@ def fitted(slope: float, reach: float, *start: float) -> tuple[np.ndarray, float
 
 
 @pytest.mark.parametrize("slope", [0.1, 0.5, 1.0])
-@pytest.mark.parametrize("start", [(0.0, END), (0.0, 1.5 * MM, END), (-1.0 * MM, 0.0, 1.0 * MM, END, END + MM)])
+@pytest.mark.parametrize(
+    "start", [(0.0, END), (0.0, 1.5 * MM, END), (-1.0 * MM, 0.0, 1.0 * MM, END, END + MM)]
+)
 def test_the_error_of_a_fit_is_that_of_the_drawn_path(slope: float, start: tuple[float, ...]) -> None:
     points, largest = fitted(slope, 2.0 * MM, *start)
     assert drawn_error(points, slope, 2.0 * MM) == pytest.approx(largest, rel=0.03)
@@ -78,7 +80,9 @@ def test_no_placing_of_two_points_is_better_than_the_fit(slope: float) -> None:
 
 
 def test_more_points_are_needed_only_for_more() -> None:
-    errors = [fitted(0.5, 2.0 * MM, *start)[1] for start in [(0.0, END), (0.0, 0.5 * MM, END - 0.5 * MM, END)]]
+    errors = [
+        fitted(0.5, 2.0 * MM, *start)[1] for start in [(0.0, END), (0.0, 0.5 * MM, END - 0.5 * MM, END)]
+    ]
     assert errors[0] > 0.1 * MM
     assert errors[1] < 0.4 * errors[0]
 

@@ -16,7 +16,7 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.units import MM
 
-STEPS, WEIGHINGS, SECANTS = 24, 8, 3
+STEPS, WEIGHINGS, SECANTS = 24, 8, 4
 """Gauss-Newton steps, how often the weights are raised within one, and steps to the nearest place of the curve."""
 
 FIRST, SHORTEST, LONGEST = 5e-4, 2e-6, 2e-3
@@ -52,9 +52,9 @@ class Curves:
     def __getitem__(self, chosen: Ints | Bools) -> Curves:
         return Curves(*(getattr(self, each.name)[chosen] for each in fields(self)))
 
-    def nearest(self, points: Floats, parameter: Floats) -> Floats:
+    def nearest(self, points: Floats, parameter: Floats, secants: int = SECANTS) -> Floats:
         """(G, K) [m] parameters of the places nearest to points (G, K, 3), looked for from ``parameter`` (G, K)."""
-        for _ in range(SECANTS + 1):
+        for _ in range(secants):
             here, tangent, along = self.at(parameter)
             gap = np.sum((points - here) * tangent, axis=2)
             parameter = parameter + np.clip(
@@ -176,11 +176,11 @@ def _evaluate(
     place = weights @ points
     if near is None and parameter is not None:
         near = (weights @ parameter[..., None])[..., 0]
-    at = curves.nearest(place, np.asarray(near)[:, : place.shape[1]])
+    at = curves.nearest(place, np.asarray(near)[:, : place.shape[1]], SECANTS if parameter is not None else 2)
     more, factors = _turns(curves, at)
     weights, slope = (_with_turns(values, more, factors) for values in (weights, slope))
     place = weights @ points
-    at = curves.nearest(place, _with_turns(at, more, factors))
+    at = curves.nearest(place, _with_turns(at, more, factors), 1)
     here, tangent, along = curves.at(at)
     off = place - here
     off -= np.sum(off * tangent, axis=2)[..., None] * tangent

@@ -40,10 +40,10 @@ MARGIN = 3.0 * MM
 PLACES = 440
 """Places of a curve."""
 
-ENOUGH = 0.6
+ENOUGH = 0.85
 """Share of the allowed error with which a fit ends."""
 
-SHOWS = 0.7
+SHOWS = 0.9
 """Share of the tolerance: ramps whose ends are rounded off by less keep the one point that they have."""
 
 APART = 0.1
@@ -285,27 +285,30 @@ def _fitted(
     ramps: _FittedRamps, curves: Curves, count: int, allowed: float, names: Ints
 ) -> dict[int, _Found]:
     """Of the ramps that ``count`` inserted points can follow, their points by ``names`` (G,)."""
-    found: dict[int, tuple[float, _Found]] = {}
+    found: dict[int, _Found] = {}
     for exact in (False, True):
         some = np.flatnonzero(ramps.exact == exact)
         if not len(some):
             continue
-        part, curve = ramps[some], curves[some]
-        starts, own = (_exact_starts if exact else _starts)(part, count)
+        starts, own = (_exact_starts if exact else _starts)(ramps[some], count)
+        left = np.arange(len(some))
         for start, place in zip(starts, own.tolist(), strict=True):
+            part, curve = ramps[some[left]], curves[some[left]]
             first = curve.first if exact else curve.ends[:, 0]
-            parameter = np.column_stack([first, start, curve.ends[:, 1]])
+            parameter = np.column_stack([first, start[left], curve.ends[:, 1]])
             width = parameter.shape[1]
             before = np.arange(width) <= (-1 if exact else place + 1)
             reach = np.where(before, part.reach[:, :1], part.reach[:, 1:])
-            shortest = np.broadcast_to(part.spacing[:, None], (len(some), width - 1))
+            shortest = np.broadcast_to(part.spacing[:, None], (len(left), width - 1))
             points, largest = fit_points(curve, parameter, reach, shortest, ENOUGH * allowed)
             along = curve.nearest(points, parameter)[:, 1:-1]
-            for k in np.flatnonzero(largest <= allowed).tolist():
-                name = int(names[some[k]])
-                if name not in found or largest[k] < found[name][0]:
-                    found[name] = float(largest[k]), _Found(points[k, 1:-1], along[k], place)
-    return {name: each for name, (_, each) in found.items()}
+            good = largest <= allowed
+            for k in np.flatnonzero(good).tolist():
+                found[int(names[some[left[k]]])] = _Found(points[k, 1:-1], along[k], place)
+            left = left[~good]
+            if not len(left):
+                break
+    return found
 
 
 def _without_points(
