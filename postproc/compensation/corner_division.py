@@ -73,7 +73,8 @@ class CornerDivision:
         correction, turns = result.correction.copy(), np.array(result.turn)
         correction[rows], turns[rows] = shift, turn
         command = _overlaid(result.command, rows, poses)
-        return replace(result, command=command, correction=correction, turn=turns, rounded=rows)
+        rounded = np.union1d(result.rounded, rows)
+        return replace(result, command=command, correction=correction, turn=turns, rounded=rounded)
 
 
 def _overlaid(base: Placed, rows: Ints, poses: Poses) -> PoseRows:
@@ -117,13 +118,20 @@ def with_corners(
     there = np.flatnonzero(corner >= 0)
     motion[there] = corner[there] + np.searchsorted(before, corner[there], "right")
 
+    many = np.zeros(len(used), np.int64)
+    if chosen.place is not None:
+        many = np.bincount(chosen.group, minlength=len(used)) + (
+            division.role[chosen.corner] != Role.ORIGINAL
+        )
     own = np.zeros(len(used), np.int64)
     own[group[there]] = motion[there]
 
     poses = Poses(np.empty((len(row), 3, 3)), np.empty((len(row), 3)))
     poses.put(there, division.command[corner[there]])
     new = np.flatnonzero(inner)
-    poses.put(new, _on_rounded_path(task, row[new], share[new]))
+    poses.put(new, commands_on_rounded_path(task, row[new], share[new]))
+    if chosen.own_place is not None and chosen.place is not None:
+        poses.position[:] = np.concatenate([chosen.own_place[numbers], chosen.place[inserted]])[order]
     arcs = [np.insert(a, before, np.nan, axis=0) for a in (division.centre, division.normal, division.sweep)]
     made = Subdivision(
         np.insert(division.source, before, row[added].astype(division.source.dtype)),
@@ -137,7 +145,9 @@ def with_corners(
         division.findings,
         division.not_refined,
         division.lead_ins,
-        fits=CornerFits(motion, own[group], chosen.before[group]),
+        fits=_all_fits(
+            division.fits, CornerFits(motion, own[group], chosen.before[group], many[group]), before
+        ),
     )
     curved = _arcs_of(task, made, motion)
     via = _on_path(task, made, curved)
@@ -147,12 +157,27 @@ def with_corners(
     return found.moved(task, poses if fitted is None else fitted.poses[np.flatnonzero(used[fitted.group])])
 
 
+def _all_fits(old: CornerFits | None, new: CornerFits, before: Ints) -> CornerFits:
+    """The ``new`` fits of a division with those that it had before motions were inserted ``before`` (A,) others."""
+    if old is None:
+        return new
+    point, corner = (at + np.searchsorted(before, at, "right") for at in (old.point, old.corner))
+    point = np.concatenate([point, new.point])
+    order = np.argsort(point, kind="stable")
+    return CornerFits(
+        point[order],
+        np.concatenate([corner, new.corner])[order],
+        np.concatenate([old.before, new.before])[order],
+        np.concatenate([old.inserted, new.inserted])[order],
+    )
+
+
 def _of_old(command: Placed, old: Ints) -> Poses:
     """Commands (K) of motions of a division before others were inserted; of these, -1, any."""
     return command[np.maximum(old, 0)].copy()
 
 
-def _on_rounded_path(task: CompensationProblem, row: Ints, share: Floats) -> Poses:
+def commands_on_rounded_path(task: CompensationProblem, row: Ints, share: Floats) -> Poses:
     """The commands (K) by which the tool is on the rounded path of the program at the shares (K,) of rows (K,)."""
     wanted, _ = original(task, row, share)
     goal = task.goal(row, wanted, share)

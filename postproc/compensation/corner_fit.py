@@ -9,8 +9,7 @@ evaluated again.  Where the point alone is not enough, others are inserted besid
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,9 +18,10 @@ from postproc.base.batches import blocks, in_blocks
 from postproc.base.geometry import Poses, lengths, product, rotation_from_vector
 from postproc.compensation.corner_division import CornerDivision, with_corners
 from postproc.compensation.corner_points import PointChooser
-from postproc.compensation.corners import compare_corners_at, evaluate_corners, find_corners
+from postproc.compensation.corners import compare_corners_at, evaluate_corners, find_corners, suspect_corners
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.problem import CompensationProblem
+from postproc.compensation.ramp_points import NEVER, LeastPoints, choose_ramp_points
 from postproc.compensation.rounded_path import Blend, RoundedOutput, approximations
 from postproc.compensation.subdivision import Limits, Subdivision
 
@@ -30,6 +30,10 @@ ROUNDS, WEIGHINGS = 4, 24
 
 ALLOWED = 0.9
 """Share of the tolerance that a corner may take: the path is evaluated as it is run, and digits take little."""
+
+ON_RAMPS, FITTED = 0.97, 0.92
+"""The same on ramps of the force, where a smaller share takes more points (of more than the tolerance, once written,
+further ones), and with which their points are fitted to a curve, which is a little simpler than the path."""
 
 BETTER = 0.9
 """A fitted corner that keeps more of its error stays as it was."""
@@ -46,19 +50,23 @@ def fit_corners(
     result: CorrectionResult,
     division: Subdivision,
     limits: Limits,
-    plain: Collection[tuple[int, float]] = (),
+    least: LeastPoints | None = None,
 ) -> tuple[CorrectionResult, Subdivision]:
     """The result and the division with the points of approximated corners moved, where the path comes nearer to the
-    original's; ``plain``: rows and shares of corners that stay as they are."""
+    original's; ``least``: of corners that were no better as they were written."""
+    least = {} if least is None else least
     if task.gain != 1.0:
         return result, division
+    result, division = _fit_ramps(task, result, division, limits, least)
     motion = find_corners(task, result, division)
+    if division.fits is not None:
+        motion = np.setdiff1d(motion, division.fits.point)
     # of points inserted before exact ends it is known once they are written
     motion = motion[~np.isnan(task.toolpath.approximation[division.source[motion]])]
-    if plain:
+    if least:
         place = zip(division.source[motion].tolist(), division.share[motion].tolist(), strict=True)
-        motion = motion[np.array([one not in plain for one in place], bool)]
-    corners = compare_corners_at(task, division, motion)
+        motion = motion[np.array([least.get(one, 0) < NEVER for one in place], bool)]
+    corners = compare_corners_at(task, division, suspect_corners(task, result, division, motion))
     size = _size(task, corners.difference, corners.angle)
     bad = (size > 1.0) & np.isfinite(size)
     if not bad.any():
@@ -77,20 +85,61 @@ def fit_corners(
     return fitted.result(task, result), fitted.division
 
 
-def corners_not_improved(task: CompensationProblem, division: Subdivision) -> set[tuple[int, float]]:
-    """Rows and shares of the fitted corners that are no better as ``division`` was written, or whose approximation it
-    does not state."""
+def _fit_ramps(
+    task: CompensationProblem,
+    result: CorrectionResult,
+    division: Subdivision,
+    limits: Limits,
+    least: LeastPoints,
+) -> tuple[CorrectionResult, Subdivision]:
+    """The same with the points on ramps of the force, as few as hold the tolerance."""
+    least = dict(least)
+    while True:
+        part, chosen = choose_ramp_points(task, result, division, limits, least, FITTED * task.tolerance)
+        if chosen is None:
+            return result, division
+        chosen = replace(chosen, before=np.full(len(chosen.corner), 1.0 / ALLOWED))
+        fitted = with_corners(task, result, part, chosen, np.ones(len(chosen.corner), bool))
+        enough = ON_RAMPS / ALLOWED
+        fitted, _ = _fitted(task, fitted, enough)
+        after = _largest(task, fitted)
+        bad = ~(after <= enough)
+        if not bad.any():
+            return fitted.result(task, result), fitted.division
+        least |= _more_points(fitted.division, bad[fitted.group])
+
+
+def corners_not_improved(task: CompensationProblem, division: Subdivision) -> LeastPoints:
+    """The fitted corners that are no better as ``division`` was written, or whose approximation it does not state."""
     if division.fits is None:
-        return set()
-    point, corner, before = division.fits.point, division.fits.corner, division.fits.before
+        return {}
+    point, before = division.fits.point, division.fits.before
     unknown = np.isnan(approximations(task, division, point))
+    return _more_points(division, unknown | (_at_points(task, division, point) > before))
+
+
+def _at_points(task: CompensationProblem, division: Subdivision, point: Ints) -> Floats:
+    """(P,) the errors where the motions ``point`` (P,) are rounded off, in parts of the allowed one."""
 
     def evaluated(part: slice) -> Floats:
         return _size(task, *evaluate_corners(RoundedOutput(task, division, point[part]), point[part])[1:])
 
-    size = np.concatenate([np.empty(0), *in_blocks(evaluated, len(point), BLOCK)])
-    worse = corner[unknown | (size > before)]
-    return set(zip(division.source[worse].tolist(), division.share[worse].tolist(), strict=True))
+    return np.concatenate([np.empty(0), *in_blocks(evaluated, len(point), BLOCK)])
+
+
+def _more_points(division: Subdivision, bad: Bools) -> LeastPoints:
+    """What has to become of the corners of the points ``bad`` (P,): one point more on a ramp, the others stay."""
+    if division.fits is None:
+        return {}
+    corner, inserted = division.fits.corner[bad], division.fits.inserted[bad]
+    count = np.where(inserted > 0, inserted + 1, NEVER).tolist()
+    return dict(
+        zip(
+            zip(division.source[corner].tolist(), division.share[corner].tolist(), strict=True),
+            count,
+            strict=True,
+        )
+    )
 
 
 def _size(task: CompensationProblem, off: Floats, angle: Floats) -> Floats:
@@ -105,11 +154,20 @@ class _CornerSamples:
     group: Ints
     at: Ints
     share: Floats
+    segments: int
+
+    @property
+    def by_segment(self) -> tuple[Ints, Ints, Floats]:
+        """Group (K,), and at and share (K, S / K), of each of the segments."""
+        at, share = self.at.reshape(self.segments, -1), self.share.reshape(self.segments, -1)
+        return self.group.reshape(self.segments, -1)[:, 0], at, share
 
 
-def _fitted(task: CompensationProblem, fitted: CornerDivision) -> tuple[CornerDivision, Floats]:
+def _fitted(
+    task: CompensationProblem, fitted: CornerDivision, enough: float = 0.0
+) -> tuple[CornerDivision, Floats]:
     """The best poses that were found for the points of each corner, and what remains (G,), in parts of the allowed
-    error."""
+    error; none is looked for where ``enough`` or less remains of all."""
     best, least = fitted.poses.copy(), np.full(len(fitted.group_start) - 1, np.inf)
     for number in range(ROUNDS + 1):
         steps = (np.zeros((len(fitted.motion), 3)), np.zeros((len(fitted.motion), 3)))
@@ -120,13 +178,26 @@ def _fitted(task: CompensationProblem, fitted: CornerDivision) -> tuple[CornerDi
         least[won] = size[won]
         points = np.flatnonzero(won[fitted.group])
         best.put(points, fitted.poses[points])
-        if number == ROUNDS:
+        if number == ROUNDS or least.max(initial=0.0) <= enough:
             break
         moved = Poses(
             product(rotation_from_vector(steps[1]), fitted.poses.rotation), fitted.poses.position + steps[0]
         )
         fitted = fitted.moved(task, moved)
     return fitted.moved(task, best), least
+
+
+def _largest(task: CompensationProblem, fitted: CornerDivision) -> Floats:
+    """(G,) the largest errors of the corners, looked for closely, in parts of the allowed one."""
+    largest = np.zeros(len(fitted.group_start) - 1)
+    for part in blocks(len(largest), BLOCK):
+        first, last = fitted.group_start[part.start], fitted.group_start[part.stop]
+        motions = fitted.motion[first:last]
+        output = RoundedOutput(task, fitted.division, np.unique(np.concatenate([motions, motions + 1])))
+        group, at, share = _samples(fitted, output, part).by_segment
+        size = _size(task, *output.peaks(at, share))
+        np.maximum.at(largest, group, size)
+    return largest
 
 
 def _evaluate(
@@ -156,7 +227,8 @@ def _evaluate(
 
 
 def _samples(fitted: CornerDivision, output: RoundedOutput, part: slice) -> _CornerSamples:
-    """Of the groups ``part``: along all segments beside their points."""
+    """Of the groups ``part``: along all segments beside their points, but for the parabolas at the far ends of the
+    first and the last: these are of other corners."""
     low, high = (fitted.group_start[part.start : part.stop + 1][k:] for k in (0, 1))
     start, stop = fitted.motion[low[: len(high)]], fitted.motion[high - 1] + 1
     count = stop - start + 1
@@ -164,8 +236,13 @@ def _samples(fitted: CornerDivision, output: RoundedOutput, part: slice) -> _Cor
     number = np.arange(len(group)) - np.repeat(np.cumsum(count) - count, count)
     at = output.place(start[group - part.start] + number)
     share = output.samples(at)
+    last = number == count[group - part.start] - 1
+    before = np.where(at > 0, output.reach[np.maximum(at - 1, 0)], 0.0) / output.extent[at]
+    after = 1.0 - output.reach[at] / output.extent[at]
+    share = np.maximum(share, np.where(number == 0, before, 0.0)[:, None])
+    share = np.minimum(share, np.where(last, after, 1.0)[:, None])
     many = share.shape[1]
-    return _CornerSamples(np.repeat(group, many), np.repeat(at, many), share.ravel())
+    return _CornerSamples(np.repeat(group, many), np.repeat(at, many), share.ravel(), len(at))
 
 
 def _weights(fitted: CornerDivision, output: RoundedOutput, samples: _CornerSamples, part: slice) -> Floats:

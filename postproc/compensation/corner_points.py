@@ -31,7 +31,8 @@ SAGITTA = 0.1
 class ChosenPoints:
     """G corners to be fitted.  corner (G,): motions of the division that end in them; before (G,): their errors in
     parts of the allowed one; inner (G,): their own points are moved onto the rounded path.  Inserted (A,): group (A,),
-    the corner; row (A,), share (A,): where."""
+    the corner; row (A,), share (A,): where.  own_place (G, 3), place (A, 3) [m]: commands at which the points
+    are to be, where they were fitted already, on ramps of the force."""
 
     corner: Ints
     before: Floats
@@ -39,6 +40,8 @@ class ChosenPoints:
     group: Ints
     row: Ints
     share: Floats
+    own_place: Floats | None = None
+    place: Floats | None = None
 
 
 class PointChooser:

@@ -104,10 +104,9 @@ def evaluate_corners(
     away = reach[:, None] * samples / output.extent[segment]
     share = np.where(later, away, 1.0 + away)
     if samples is SAMPLES:
-        step = np.abs(away).max(axis=1) * (samples[1] - samples[0])
-        off, angle = output.peaks(segment, share, step[:, None])
+        off, angle = output.peaks(segment, share)
     else:
-        off, angle = output.peaks(segment, share, 0.0, closer=0)
+        off, angle = output.peaks(segment, share, closer=0)
     return reach, np.where(reach > 0, off, 0.0), np.where(reach > 0, angle, 0.0)
 
 
@@ -203,6 +202,12 @@ def _candidates(
     return np.unique(np.concatenate([own[row[chosen | ~plain]], inserted]))
 
 
+def _turning(task: CompensationProblem, result: CorrectionResult, rows: Ints) -> Floats:
+    """(K, 3) change of the correction's turn, rad a m, along motions ``rows`` (K,)."""
+    change = result.turn[rows] - result.turn[np.maximum(rows - 1, 0)]
+    return np.asarray(change / np.maximum(task.desired_path.length[rows], 1e-9)[:, None])
+
+
 def _slope(result: CorrectionResult, rows: Ints, length: Floats) -> Floats:
     """(K, 3) change of the correction, m a m, along motions ``rows`` (K,)."""
     before = np.maximum(rows - 1, 0)
@@ -216,13 +221,42 @@ def _direction(task: CompensationProblem, rows: Ints) -> Floats:
         return np.asarray(step / lengths(step)[:, None])
 
 
-def _cut_off(task: CompensationProblem, division: Subdivision, motions: Ints) -> Floats:
-    """(K,) [m] by how much the corners at the ends of ``motions`` (K,) are rounded off at most: in the output, or in
-    the program."""
+def suspect_corners(
+    task: CompensationProblem, result: CorrectionResult, division: Subdivision, motion: Ints
+) -> Ints:
+    """Those of the corners ``motion`` (K,) that may exceed the tolerance: all near ramps of the force and at inserted
+    points, of others those that are rounded off by more than ``CLOSE`` of it otherwise than in the program.
+
+    Where the deflection changes evenly, the tool in the middle of a rounded corner is as far off as the output's corner
+    is cut off otherwise than the program's.
+    """
+    source = division.source[motion]
+    close = division.role[motion] != Role.ORIGINAL
+    if task.force.ramps is not None:
+        close |= np.isin(source, task.force.ramps.row) | np.isin(source + 1, task.force.ramps.row)
+    close |= (
+        task.desired_path.arc[source] | task.desired_path.arc[np.minimum(source + 1, len(task.toolpath) - 1)]
+    )
+    few = np.flatnonzero(~close)
+
+    def differs(part: slice) -> Bools:
+        at = motion[few[part]]
+        rows = division.source[at]
+        quarter = 0.25 * original_reach(task, rows)[:, None]
+        turned = lengths(quarter * (_turning(task, result, rows + 1) - _turning(task, result, rows)))
+        program = quarter * (_direction(task, rows + 1) - _direction(task, rows))
+        off = lengths(_cut_off_vectors(task, division, at) - program)
+        return ~(off <= CLOSE * task.tolerance) | ~(turned <= CLOSE * task.tolerance_angle)
+
+    close[few] = np.concatenate([np.empty(0, bool), *in_blocks(differs, len(few))])
+    return np.asarray(motion[close])
+
+
+def _cut_off_vectors(task: CompensationProblem, division: Subdivision, motions: Ints) -> Floats:
+    """(K, 3) [m] from the corners at the ends of ``motions`` (K,) to the middle of the parabolas of the output."""
     before, after = (subdivided_motions(task, division, motions + k) for k in (0, 1))
     half = 0.5 * np.minimum(extents(before), extents(after))
     distance = np.fmin(approximations(task, division, motions), half)
-    many = len(motions)
     middle = [
         side.at(np.clip(share, 0.0, 1.0)).position
         for side, share in (
@@ -230,12 +264,18 @@ def _cut_off(task: CompensationProblem, division: Subdivision, motions: Ints) ->
             (after, 0.5 * distance / extents(after)),
         )
     ]
-    off = lengths(0.5 * (middle[0] + middle[1]) - before.end.position)
+    return np.asarray(0.5 * (middle[0] + middle[1]) - before.end.position)
+
+
+def _cut_off(task: CompensationProblem, division: Subdivision, motions: Ints) -> Floats:
+    """(K,) [m] by how much the corners at the ends of ``motions`` (K,) are rounded off at most: in the output, or in
+    the program."""
+    off = lengths(_cut_off_vectors(task, division, motions))
     own = np.flatnonzero(division.role[motions] == Role.ORIGINAL)
     rows = division.source[motions[own]]
     first = _direction(task, rows)
     last = _direction(task, rows + 1)
-    program = np.zeros(many)
+    program = np.zeros(len(motions))
     program[own] = 0.25 * original_reach(task, rows) * np.nan_to_num(lengths(last - first))
     return np.fmax(off, program)
 

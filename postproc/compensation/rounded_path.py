@@ -8,12 +8,15 @@ that is the quadratic Bezier curve with the end point as its control point.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 from postproc.base.geometry import Poses, lengths
+from postproc.base.units import MM
 from postproc.compensation.desired_path import interpolate_poses
 from postproc.compensation.path_error import PathSegments
 from postproc.compensation.problem import CompensationProblem
@@ -29,8 +32,14 @@ FLATTEST = 0.05
 AT_ENDS, BETWEEN = np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 9)
 """Where a motion is evaluated: shares of the reach of the parabolas at its ends, and of its length."""
 
+NEAR = np.array([0.8, 1.6, 2.5, 3.5, 5.0, 8.0]) * MM
+"""[m] And so far from its ends: what is long changes there."""
+
 CLOSER, AROUND = 2, np.linspace(-1.0, 1.0, 7)
 """How often, and where, it is evaluated closer to its largest error."""
+
+PEAKS, TURNINGS = 1, 3
+"""Peaks around which it is, and steps to the place where the force turns."""
 
 NEAREST = 1e-12
 """[m] The extent of a motion that leads nowhere."""
@@ -118,34 +127,102 @@ class RoundedOutput:
         return at
 
     def samples(self, at: Ints) -> Floats:
-        """(K, S) shares of the segments ``at`` (K,) at which they are evaluated, parabolas included."""
+        """(K, S) ascending shares of the segments ``at`` (K,) at which they are evaluated, parabolas included."""
         extent, reach = self.extent[at, None], self.reach[at, None]
         before = np.where(at > 0, self.reach[np.maximum(at - 1, 0)], 0.0)[:, None]
         between = np.broadcast_to(BETWEEN, (len(at), len(BETWEEN)))
-        return np.concatenate([AT_ENDS * before / extent, 1.0 - AT_ENDS * reach / extent, between], axis=1)
+        near = np.minimum(NEAR / extent, 0.5)
+        parabolas = AT_ENDS * before / extent, 1.0 - AT_ENDS * reach / extent
+        return np.sort(np.concatenate([*parabolas, near, 1.0 - near, between], axis=1), axis=1)
 
     def largest(self, motions: Ints) -> tuple[Floats, Floats]:
         """(K,) [m] and (K,) [rad]: by how much the tool under load is off along ``motions`` (K,), from the middle of
         the parabola at their start to that at their end."""
         at = self.place(motions)
         share = self.samples(at)
-        return self.peaks(np.broadcast_to(at[:, None], share.shape), share, 0.5 / (len(BETWEEN) - 1))
+        return self.peaks(np.broadcast_to(at[:, None], share.shape), share)
 
-    def peaks(
-        self, at: Ints, share: Floats, step: Floats | float, closer: int = CLOSER
-    ) -> tuple[Floats, Floats]:
+    def peaks(self, at: Ints, share: Floats, closer: int = CLOSER) -> tuple[Floats, Floats]:
         """(K,) [m] and (K,) [rad]: by how much the tool is off at most at the shares (K, S) of the segments ``at``
-        (K, S), and ``closer`` times nearer around the largest: it is steep where the force changes fast."""
-        off, angle = np.zeros(len(at)), np.zeros(len(at))
-        for _ in range(closer + 1):
+        (K, S), in the order of the path, ``closer`` times nearer around the ``PEAKS`` largest of its peaks, and where
+        the force starts or ends to change over a ramp: there it turns."""
+        many, count = share.shape
+        off, angle = np.zeros(many), np.zeros(many)
+        gap = np.where(np.diff(at, axis=1) == 0, np.diff(share, axis=1), 0.0)
+        edge = np.zeros((many, 1))
+        width = np.maximum(np.hstack([edge, gap]), np.hstack([gap, edge]))
+        for level in range(closer + 1):
             found = self.deviations(at.ravel(), share.ravel())
-            here, turned = (lengths(part).reshape(share.shape) for part in (found.shift, found.turn))
-            off, angle = np.maximum(off, here.max(axis=1)), np.maximum(angle, turned.max(axis=1))
-            peak = here.argmax(axis=1)[:, None]
-            at = np.broadcast_to(np.take_along_axis(at, peak, 1), (len(at), len(AROUND)))
-            share = np.clip(np.take_along_axis(share, peak, 1) + step * AROUND, 0.0, 1.0)
-            step = step * (AROUND[1] - AROUND[0])
+            here, turned = (lengths(part).reshape(at.shape) for part in (found.shift, found.turn))
+            off = np.maximum(off, here.reshape(many, -1).max(axis=1))
+            angle = np.maximum(angle, turned.reshape(many, -1).max(axis=1))
+            if level == closer:
+                break
+            if level == 0 and self.turns.size:
+                for part in self._where_force_turns(at, share, found):
+                    off, angle = np.maximum(off, part[0]), np.maximum(angle, part[1])
+            if level == 0:
+                padded = np.pad(here, ((0, 0), (1, 1)), constant_values=-1.0)
+                top = (here >= padded[:, :-2]) & (here >= padded[:, 2:])
+                peak = np.argsort(np.where(top, -here, 0.0), axis=1, kind="stable")[:, : min(PEAKS, count)]
+            else:  # of each peak the largest of the places around it
+                rows = here.reshape(many, -1, len(AROUND)).argmax(axis=2)
+                peak = rows + len(AROUND) * np.arange(rows.shape[1])
+            centre, width = np.take_along_axis(share, peak, 1), np.take_along_axis(width, peak, 1)
+            at = np.repeat(np.take_along_axis(at, peak, 1), len(AROUND), axis=1)
+            share = np.clip(centre[:, :, None] + width[:, :, None] * AROUND, 0.0, 1.0).reshape(many, -1)
+            width = np.repeat(width * (AROUND[1] - AROUND[0]), len(AROUND), axis=1)
         return off, angle
+
+    @cached_property
+    def turns(self) -> Floats:
+        """(T, 2) rows and shares of the program's path near these motions where ramps of the force start or end."""
+        ramps = self.task.force.ramps
+        if ramps is None or not len(self.motions):
+            return np.empty((0, 2))
+        rows = self.segments.rows
+        row, share = ramps.ends()
+        start = ramps.row[ramps.start <= 0.0]
+        row, share = np.concatenate([row, start]), np.concatenate([share, np.zeros(len(start))])
+        near = np.isin(row, np.concatenate([rows, rows + 1]))
+        return np.stack([row[near], share[near]], axis=1)
+
+    def _where_force_turns(
+        self, at: Ints, share: Floats, found: Deviations
+    ) -> Iterator[tuple[Floats, Floats]]:
+        """Errors (K,) [m] and (K,) [rad] where the tool is at the ``turns`` of the force: between the two of the shares
+        (K, S) of the segments ``at`` (K, S) beside each, of which the places are ``found`` (K S)."""
+        low = int(min(found.row.min(), self.turns[:, 0].min()))
+        high = int(max(found.row.max(), self.turns[:, 0].max()))
+        length = self.task.desired_path.length[low : high + 1]
+        begins = np.concatenate([[0.0], np.cumsum(length)])
+        place = (begins[found.row - low] + found.share * length[found.row - low]).reshape(at.shape)
+        row = self.turns[:, 0].astype(np.int64) - low
+        turns = np.unique(begins[row] + self.turns[:, 1] * length[row])
+        passed = np.searchsorted(turns, place)
+        which, number = np.nonzero((np.diff(passed, axis=1) > 0) & (np.diff(at, axis=1) == 0))
+        if not len(which):
+            return
+        turn = turns[np.minimum(passed[which, number], len(turns) - 1)]
+        segment = at[which, number]
+        ends = [share[which, number + k] for k in (0, 1)]
+        away = [place[which, number + k] - turn for k in (0, 1)]
+        for _ in range(TURNINGS):
+            between = ends[0] - away[0] * (ends[1] - ends[0]) / np.maximum(away[1] - away[0], NEAREST)
+            between = np.clip(between, *ends)
+            here = self.deviations(segment, between)
+            off, angle = np.zeros(len(at)), np.zeros(len(at))
+            np.maximum.at(off, which, lengths(here.shift))
+            np.maximum.at(angle, which, lengths(here.turn))
+            yield off, angle
+            gap = (
+                begins[np.clip(here.row - low, 0, len(length) - 1)]
+                + here.share * self.task.desired_path.length[here.row]
+                - turn
+            )
+            before = gap < 0
+            ends = [np.where(before, between, ends[0]), np.where(before, ends[1], between)]
+            away = [np.where(before, gap, away[0]), np.where(before, away[1], gap)]
 
     def blend(self, at: Ints, share: Floats) -> Blend:
         """Where the shares (S,) of the segments ``at`` (S,) lie on parabolas."""

@@ -41,11 +41,13 @@ class Limits:
 class CornerFits:
     """Approximated corners whose points were moved, so that the rounded path follows that of the original.  point (P,):
     motions of the output that end in such points: the tool is not there; corner (P,): the motion among them at whose
-    end the corner itself is; before (P,): the error there without, in parts of the allowed one."""
+    end the corner itself is; before (P,): the error there without, in parts of the allowed one; inserted
+    (P,): so many points on a ramp of the force, 0 of other corners."""
 
     point: Ints
     corner: Ints
     before: Floats
+    inserted: Ints
 
 
 @dataclass(frozen=True)

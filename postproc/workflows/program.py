@@ -6,7 +6,7 @@ Nothing is written that was not read back from its own bytes and checked.
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -22,6 +22,7 @@ from postproc.compensation.axis_limits import check_limits
 from postproc.compensation.corner_fit import corners_not_improved, fit_corners
 from postproc.compensation.correct import MotionOutcome, correct
 from postproc.compensation.path_comparison import cuts_not_improved
+from postproc.compensation.ramp_points import LeastPoints
 from postproc.compensation.subdivide import subdivide
 from postproc.compensation.subdivision import Limits
 from postproc.languages.dialect import EditedTargets, Program
@@ -107,9 +108,9 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     stage("correcting")
     target = _target(request)
     excluded: dict[int, Finding] = {}
-    plain: set[tuple[int, float]] = set()
+    least: dict[tuple[int, float], int] = {}
     while True:
-        intended = _corrected(request, ready, target.stem, excluded, plain)
+        intended = _corrected(request, ready, target.stem, excluded, least)
         task, edits = intended.task, intended.edits
         stage("writing, and reading back")
         ready = ready.without_text()
@@ -130,7 +131,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
         if not worse and not corners:
             break
         excluded |= worse
-        plain |= corners
+        least |= corners
         stage("correcting without what would be no better")
         ready = ready.with_text()
     program = ready.program
@@ -241,10 +242,10 @@ def _corrected(
     ready: Prepared,
     stem: str,
     worse: Mapping[int, Finding],
-    plain: Collection[tuple[int, float]],
+    least: LeastPoints,
 ) -> IntendedProgram:
     """The correction and its edits; what cannot be divided or written as planned stays, and the rest is computed again.
-    worse: rows whose cuts stay as they are, and why; plain: corners that are not fitted."""
+    worse: rows whose cuts stay as they are, and why; least: of corners that were no better, their points."""
     task, cell = ready.task, ready.cell
     if worse:
         path = task.toolpath
@@ -267,7 +268,7 @@ def _corrected(
         release_free_memory()
         division = subdivide(task, result, allowed)
         release_free_memory()
-        result, division = fit_corners(task, result, division, allowed, plain)
+        result, division = fit_corners(task, result, division, allowed, least)
         release_free_memory()
         limit_findings, beyond = check_limits(task, division)
         release_free_memory()

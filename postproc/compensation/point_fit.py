@@ -1,0 +1,263 @@
+"""Points of a rounded polygon that follows a curve, as near to it as so few points can.
+
+The controller goes straight from point to point and rounds each off by a parabola (``rounded_path``).  All coordinates
+of the inner points are free: across the curve they take away what is off; along it they decide where the polygon turns
+and, as a parabola reaches no farther than half of the shorter line beside it, how closely.  The largest distance across
+the curve is made least by Gauss-Newton steps, damped and of limited length (Levenberg 1944), each the least largest
+error of the linear problem by raised weights (Lawson 1961).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.units import MM
+
+STEPS, WEIGHINGS, SECANTS = 24, 8, 4
+"""Gauss-Newton steps, how often the weights are raised within one, and steps to the nearest place of the curve."""
+
+FIRST, SHORTEST, LONGEST = 5e-4, 2e-6, 2e-3
+"""[m] Length of a step: at first; where the search ends; at most."""
+
+ON_PARABOLA, ON_LINE = np.linspace(0.0, 1.0, 25), 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 21))
+"""Where parabolas and lines are evaluated: lines closer near their ends, where curves turn."""
+
+FROM_POINT = np.array([0.0, 0.2, 0.5, 0.8, 1.1, 1.4, 1.7, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0]) * MM
+"""[m] The same on the first and the last line, from their inner points on: farther the curves are straight."""
+
+FLATTEST = 0.05
+"""The curve goes along its tangents by this share of its parameter at least."""
+
+
+@dataclass(frozen=True)
+class Curves:
+    """G curves of N places each, with the points before and after them at which the polygon is where it is: so far the
+    curves are straight.
+
+    first, step (G,) [m]: of the parameters; ends (G, 2) [m]: parameters of the points before and after; turn (G, T)
+    [m]: at which the curve turns, ascending; place (G, N + 2, 3) [m]; tangent (G, N + 2, 3): unit vectors, square to
+    which the distance is measured (where the tool is early or late nothing is off).
+    """
+
+    first: Floats
+    step: Floats
+    ends: Floats
+    turn: Floats
+    place: Floats
+    tangent: Floats
+
+    def __getitem__(self, chosen: Ints | Bools) -> Curves:
+        return Curves(*(getattr(self, each.name)[chosen] for each in fields(self)))
+
+    def nearest(self, points: Floats, parameter: Floats, secants: int = SECANTS) -> Floats:
+        """(G, K) [m] parameters of the places nearest to points (G, K, 3), looked for from ``parameter`` (G, K)."""
+        for _ in range(secants):
+            here, tangent, along = self.at(parameter)
+            gap = np.sum((points - here) * tangent, axis=2)
+            parameter = parameter + np.clip(
+                gap / np.maximum(np.sum(along * tangent, axis=2), FLATTEST), -LONGEST, LONGEST
+            )
+        return parameter
+
+    def at(self, parameter: Floats) -> tuple[Floats, Floats, Floats]:
+        """Places, tangents and derivatives (G, S, 3) of the places at parameters (G, S)."""
+        last = self.place.shape[1] - 2  # of the curve itself
+        first, step, ends = self.first[:, None], self.step[:, None], self.ends
+        stop = first + (last - 1) * step
+        number = 1.0 + (parameter - first) / step
+        before, after = parameter < first, parameter > stop
+        number = np.where(before, 1.0 - (first - parameter) / (first - ends[:, :1]), number)
+        number = np.where(after, last + (parameter - stop) / (ends[:, 1:] - stop), number)
+        number = np.clip(number, 0.0, last + 0.999)
+        low = number.astype(np.int64)
+        part = (number - low)[..., None]
+        one = np.arange(len(low))[:, None]
+        here, there = self.place[one, low], self.place[one, low + 1]
+        tangent = self.tangent[one, low] * (1.0 - part) + self.tangent[one, low + 1] * part
+        size = np.where(low == 0, first - ends[:, :1], np.where(low == last, ends[:, 1:] - stop, step))
+        return here + part * (there - here), tangent, (there - here) / size[..., None]
+
+
+@dataclass
+class _Polygons:
+    """Polygons of K points (G, K, 3) with S places on them: off (G, S, 3) across the curves, slope (G, S, 3, V): by how
+    much the V coordinates of the inner points change it, parameter (G, S) of the nearest places of the curves."""
+
+    points: Floats
+    off: Floats
+    slope: Floats
+    parameter: Floats
+
+    @property
+    def largest(self) -> Floats:
+        """(G,) [m]"""
+        return np.asarray(_sizes(self.off).max(axis=1))
+
+
+def fit_points(
+    curves: Curves, parameter: Floats, reach: Floats, shortest: Floats, enough: float
+) -> tuple[Floats, Floats]:
+    """Points (G, K, 3) of polygons along G ``curves``, and the largest distance (G,) [m] of each from its curve.
+
+    parameter (G, K) [m]: where the points start, on the curves; the first and the last stay.  reach (G, K) [m]: from
+    where on points are rounded off; shortest (G, K - 1) [m]: lines.  enough [m]: a distance that needs no improvement.
+    """
+    points = curves.at(parameter)[0]
+    best = _evaluate(curves, points, reach, None, parameter)
+    largest = best.largest
+    trust, damping = np.full(len(points), FIRST), np.full(len(points), 1e-2)
+    for _ in range(STEPS):
+        some = np.flatnonzero((largest > enough) & (trust > SHORTEST))
+        if not len(some):
+            break
+        off, slope = best.off[some], best.slope[some]
+        step = _least_largest(off, slope, damping[some]).reshape(len(some), -1, 3)
+        step *= np.minimum(1.0, trust[some] / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-15))[:, None, None]
+        moved = best.points[some]
+        factor = _possible(moved, step, shortest[some])
+        moved[:, 1:-1] += factor[:, None, None] * step
+        found = _evaluate(curves[some], moved, reach[some], best.parameter[some], None)
+        after = found.largest
+        won = after < largest[some]
+        at = some[won]
+        for name in ("points", "off", "slope", "parameter"):
+            getattr(best, name)[at] = getattr(found, name)[won]
+        largest[at] = after[won]
+        damping[some] = np.where(won, np.maximum(0.4 * damping[some], 1e-4), 6.0 * damping[some])
+        trust[some] = np.where(won, np.minimum(1.5 * trust[some], LONGEST), 0.4 * trust[some])
+    return best.points, largest
+
+
+def _sizes(vectors: Floats) -> Floats:
+    """(...) lengths of vectors (..., 3)."""
+    return np.asarray(np.sqrt(np.sum(vectors * vectors, axis=-1)))
+
+
+def _possible(points: Floats, step: Floats, shortest: Floats) -> Floats:
+    """(G,) shares of the steps (G, K - 2, 3) with which no line is too short, 0 where there is none."""
+    factor = np.zeros(len(points))
+    for share in (0.1, 0.25, 0.5, 1.0):
+        moved = points.copy()
+        moved[:, 1:-1] += share * step
+        good = (_sizes(np.diff(moved, axis=1)) >= shortest).all(axis=1)
+        factor = np.where(good, share, factor)
+    return factor
+
+
+def _least_largest(off: Floats, slope: Floats, damping: Floats) -> Floats:
+    """(G, V) steps with which the largest of ``off`` (G, S, 3) + ``slope`` (G, S, 3, V) steps is least, damped."""
+    groups, samples, _, free = slope.shape
+    flat, side = slope.reshape(groups, 3 * samples, free), off.reshape(groups, 3 * samples, 1)
+    given = np.ones((groups, samples))
+    best, least = np.zeros((groups, free)), np.full(groups, np.inf)
+    for _ in range(WEIGHINGS):
+        heavy = np.swapaxes(flat * np.repeat(given, 3, axis=1)[..., None], 1, 2)
+        matrix = heavy @ flat
+        ridge = damping * np.maximum(np.trace(matrix, axis1=1, axis2=2), 1e-12) / free
+        step = -np.linalg.solve(matrix + ridge[:, None, None] * np.eye(free), heavy @ side)[..., 0]
+        remains = _sizes((side[..., 0] + (flat @ step[..., None])[..., 0]).reshape(groups, samples, 3))
+        largest = np.maximum(remains.max(axis=1), 1e-12)
+        won = largest < least
+        best[won], least[won] = step[won], largest[won]
+        given = given * (remains / largest[:, None] + 1e-3)
+        given = np.maximum(given / given.max(axis=1, keepdims=True), 1e-6)
+    return best
+
+
+def _evaluate(
+    curves: Curves, points: Floats, reach: Floats, near: Floats | None, parameter: Floats | None
+) -> _Polygons:
+    """The polygons (G, K, 3) against their curves; the nearest places are looked for from ``near`` (G, S), or from
+    where the points have ``parameter`` (G, K)."""
+    weights, slope = _weights(points, reach)
+    place = weights @ points
+    if near is None and parameter is not None:
+        near = (weights @ parameter[..., None])[..., 0]
+    at = curves.nearest(place, np.asarray(near)[:, : place.shape[1]], SECANTS if parameter is not None else 2)
+    more, factors = _turns(curves, at)
+    weights, slope = (_with_turns(values, more, factors) for values in (weights, slope))
+    place = weights @ points
+    at = curves.nearest(place, _with_turns(at, more, factors), 1)
+    here, tangent, along = curves.at(at)
+    off = place - here
+    off -= np.sum(off * tangent, axis=2)[..., None] * tangent
+    # where a place moves, that of the curve follows: (place - here) stays square to the tangent
+    ahead = along / np.maximum(np.sum(along * tangent, axis=2), FLATTEST)[..., None]
+    slope = slope - ahead[..., None] * np.einsum("gsi,gsiv->gsv", tangent, slope)[:, :, None, :]
+    return _Polygons(points, off, slope, at)
+
+
+def _turns(curves: Curves, at: Floats) -> tuple[Ints, Floats]:
+    """Of the places on polygons that are nearest to where their curves turn: the numbers (G, T) of the places before
+    them, by their parameters ``at`` (G, S), and how far (G, T) they are on the way to the next."""
+    rising = np.maximum.accumulate(at, axis=1)
+    number = np.stack([np.sum(rising < turn[:, None], axis=1) for turn in curves.turn.T], axis=1)
+    number = np.clip(number - 1, 0, at.shape[1] - 2)
+    low, high = (np.take_along_axis(rising, number + k, 1) for k in (0, 1))
+    return number, np.clip((curves.turn - low) / np.maximum(high - low, 1e-12), 0.0, 1.0)
+
+
+def _with_turns(values: Floats, number: Ints, part: Floats) -> Floats:
+    """``values`` (G, S, ...) with those at the places of ``_turns``."""
+    one = np.arange(len(values))[:, None]
+    shape = (*part.shape, *(1,) * (values.ndim - 2))
+    share = part.reshape(shape)
+    between = (1.0 - share) * values[one, number] + share * values[one, number + 1]
+    return np.concatenate([values, between], axis=1)
+
+
+def _weights(points: Floats, reach: Floats) -> tuple[Floats, Floats]:
+    """(G, S, K): places of the rounded polygons as parts of their points (G, K, 3), and (G, S, 3, V) by how much the
+    coordinates of the inner points change them, what they do to the reach of the parabolas included."""
+    groups, count, _ = points.shape
+    step = np.diff(points, axis=1)
+    length = np.maximum(_sizes(step), 1e-9)
+    change = np.zeros((groups, count - 1, count, 3))  # of the lengths
+    for k in range(count - 1):
+        change[:, k, k + 1] = step[:, k] / length[:, k, None]
+        change[:, k, k] = -change[:, k, k + 1]
+    round_ = np.zeros((groups, count))
+    change_round = np.zeros((groups, count, count, 3))
+    for i in range(1, count - 1):
+        shorter = np.where(length[:, i - 1] < length[:, i], i - 1, i)
+        half = 0.5 * length[np.arange(groups), shorter]
+        round_[:, i] = np.minimum(reach[:, i], half)
+        limited = (half < reach[:, i])[:, None, None]
+        change_round[:, i] = np.where(limited, 0.5 * change[np.arange(groups), shorter], 0.0)
+    parts, slopes = [], []
+
+    def add(part: Floats, more: Floats | None) -> None:
+        slope = part[:, :, None, :, None] * np.eye(3)[None, None, :, None, :]
+        parts.append(part)
+        slopes.append(slope if more is None else slope + more)
+
+    def line(i: int) -> None:
+        low, high = round_[:, i] / length[:, i], 1.0 - round_[:, i + 1] / length[:, i]
+        share = low[:, None] + ON_LINE * (high - low)[:, None]
+        if i in (0, count - 2):  # from the inner point on
+            away = np.minimum(FROM_POINT / length[:, i, None], (high - low)[:, None])
+            share = low[:, None] + away if i else (high[:, None] - away)[:, ::-1]
+        part = np.zeros((groups, share.shape[1], count))
+        part[:, :, i], part[:, :, i + 1] = 1.0 - share, share
+        add(part, None)
+
+    u = ON_PARABOLA
+    line(0)
+    for i in range(1, count - 1):
+        shares = [round_[:, i] / length[:, i - 1 + k] for k in (0, 1)]
+        part = np.zeros((groups, len(u), count))
+        first, last = (1.0 - u) ** 2 * shares[0][:, None], u**2 * shares[1][:, None]
+        part[:, :, i - 1], part[:, :, i + 1], part[:, :, i] = first, last, 1.0 - first - last
+        more = np.zeros((groups, len(u), 3, count, 3))
+        for k, bend in ((0, (1.0 - u) ** 2), (1, u**2)):
+            of_share = change_round[:, i] - shares[k][:, None, None] * change[:, i - 1 + k]
+            of_share = of_share / length[:, i - 1 + k][:, None, None]
+            toward = bend[None, :, None] * (step[:, i] if k else -step[:, i - 1])[:, None, :]
+            more += toward[:, :, :, None, None] * of_share[:, None, None]
+        add(part, more)
+        line(i)
+    slope = np.concatenate(slopes, axis=1)[:, :, :, 1:-1]
+    return np.concatenate(parts, axis=1), slope.reshape(*slope.shape[:3], -1)

@@ -1,0 +1,371 @@
+"""Where the points lie on which the correction follows a ramp of the force, as few as hold the tolerance.
+
+A force that changes over a ramp turns the correction where the ramp starts and where it ends.  A point at each place,
+and others beside them that keep the rounding short, follow that; but points that may lie anywhere follow it with fewer:
+their coordinates are fitted to the curve of the commands by which the tool is on the rounded path of the original.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.geometry import PoseRows, lengths
+from postproc.base.units import MM
+from postproc.compensation.corner_division import commands_on_rounded_path
+from postproc.compensation.corner_points import ChosenPoints
+from postproc.compensation.correct import CorrectionResult
+from postproc.compensation.point_fit import Curves, fit_points
+from postproc.compensation.problem import CompensationProblem
+from postproc.compensation.rounded_path import approximations, original
+from postproc.compensation.subdivision import Limits, Subdivision
+from postproc.toolpath import Role
+
+MOST = 200
+"""Ramps whose points are fitted: the first of a program."""
+
+NEVER = 1_000_000
+"""More points than a ramp may have."""
+
+LeastPoints = Mapping[tuple[int, float], int]
+"""By row and share of corners, or of where ramps end, the number of points that are inserted at least on a ramp;
+``NEVER``: the corner stays as it is."""
+
+MARGIN = 3.0 * MM
+"""[m] The curve goes on before the vertex and after the ramp by this, and twice the approximation."""
+
+PLACES = 440
+"""Places of a curve."""
+
+ENOUGH = 0.85
+"""Share of the allowed error with which a fit ends."""
+
+SHOWS = 0.9
+"""Share of the tolerance: ramps whose ends are rounded off by less keep the one point that they have."""
+
+APART = 0.1
+"""Share of the shortest line by which points are apart along the path of the program at least."""
+
+
+@dataclass(frozen=True)
+class _FittedRamps:
+    """G ramps.  vertex, knot (G,): the motions of the division that end where the ramp starts and where it ends; row
+    (G,): of the program, with the ramp; end [m] (G,): its length; exact (G,): the vertex is; reach (G, 2) [m]: from
+    where on points before and after the vertex are rounded off; spacing (G,) [m]: the shortest motion; margin (G,)
+    [m]: as far the curve goes on; after (G,): the motion that ends in the next point after those of the ramp."""
+
+    vertex: Ints
+    knot: Ints
+    row: Ints
+    end: Floats
+    exact: Bools
+    reach: Floats
+    spacing: Floats
+    margin: Floats
+    after: Ints
+
+    def __getitem__(self, chosen: Ints | Bools) -> _FittedRamps:
+        return _FittedRamps(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Points of one ramp: places (n, 3), path lengths (n,) [m] from the vertex, and which of them is the motion that is
+    there already."""
+
+    place: Floats
+    along: Floats
+    own: int
+
+
+def choose_ramp_points(
+    task: CompensationProblem,
+    result: CorrectionResult,
+    division: Subdivision,
+    limits: Limits,
+    least: LeastPoints,
+    allowed: float,
+) -> tuple[Subdivision, ChosenPoints | None]:
+    """The division without the points of those ramps for which others were found, and these.  allowed [m]: error."""
+    ramps, inner, fewest = _ramps(task, result, division, limits, least)
+    if not len(ramps.row):
+        return division, None
+    curves = _curves(task, division, ramps)
+    spare = limits.inserted(len(task.toolpath)) - division.inserted
+    found: dict[int, _Found] = {}
+    left = np.arange(len(ramps.row))
+    for count in range(1, len(_STARTS) + 1):
+        some = left[(fewest[left] <= count) & (count <= inner[left] + spare)]
+        if len(some):
+            found |= _fitted(ramps[some], curves[some], count, allowed, some)
+        left = np.array([k for k in left if k not in found], np.int64)
+    return _without_points(task, division, ramps, found)
+
+
+def _ramps(
+    task: CompensationProblem,
+    result: CorrectionResult,
+    division: Subdivision,
+    limits: Limits,
+    least: LeastPoints,
+) -> tuple[_FittedRamps, Ints, Ints]:
+    """The ramps of straight motions that end in an inserted point, alone and away from others; and (G,) how many points
+    are inserted for each, and have to be at least."""
+    none = np.empty(0, np.int64)
+    parts, path, desired_path = task.force.ramps, task.toolpath, task.desired_path
+    inserted = np.flatnonzero((division.role == Role.INTERMEDIATE) & (division.share < 1.0))
+    if parts is None or not len(inserted) or limits.no_insert:
+        return (
+            _FittedRamps(
+                none, none, none, np.empty(0), none > 0, np.empty((0, 2)), np.empty(0), np.empty(0), none
+            ),
+            none,
+            none,
+        )
+    row, many = np.unique(parts.row, return_counts=True)
+    at = np.searchsorted(parts.row, row)
+    end = parts.length[at]
+    good = (many == 1) & (parts.start[at] <= 0.0) & (end < parts.extent[at])
+    row, end = row[good], end[good]
+    before = row - 1
+    on = (
+        result.corrected
+        & desired_path.traceable
+        & (desired_path.length > 0)
+        & task.carries
+        & ~desired_path.arc
+    )
+    on[list({**path.constraints.locked, **path.constraints.no_insert_before})] = False
+    good = (
+        on[row] & on[before] & (result.cut[row] == result.cut[before]) & (path.tool[row] == path.tool[before])
+    )
+    row, end = row[good], end[good]
+    length = desired_path.length
+    # the point that ends the ramp, and that of the vertex
+    key = division.source[inserted] + division.share[inserted]
+    near = np.minimum(np.searchsorted(key, row + end / length[row] - 1e-9), len(key) - 1)
+    knot = inserted[near]
+    own = np.flatnonzero(division.original)
+    vertex = own[row - 1]
+    good = np.abs(key[near] - row - end / length[row]) < 1e-8
+    places = [((int(r) - 1, 1.0), (int(r), float(s))) for r, s in zip(row, division.share[knot], strict=True)]
+    fewest = np.array([max(least.get(one, 0) for one in pair) for pair in places], np.int64)
+    good &= fewest < NEVER
+    reach = np.stack([approximations(task, division, motions) for motions in (vertex, knot)], axis=1)
+    good &= np.isfinite(reach).all(axis=1) & (reach[:, 1] > 0)
+    row, end, knot, vertex, reach, fewest = (
+        a[good][: 2 * MOST] for a in (row, end, knot, vertex, reach, fewest)
+    )
+    exact = reach[:, 0] == 0
+    feed = np.nan_to_num(np.maximum(path.feed[row], path.feed[row - 1]))
+    spacing = np.maximum(limits.ramp_end, feed * limits.cycle)
+    # as far as nothing else is: half of what is left of either motion
+    taken = np.zeros(len(path))
+    taken[parts.row] = np.minimum(parts.length - parts.start, parts.extent)
+    last = end + 2.0 * spacing
+    beyond, inner = length[row] - end, np.zeros(len(row), np.int64)
+    place = division.share[inserted] * length[division.source[inserted]]
+    behind = np.where(exact, np.inf, length[row - 1] - taken[row - 1])
+    for k in range(len(row)):
+        here = inserted[division.source[inserted] == row[k]], place[division.source[inserted] == row[k]]
+        inner[k] = int((here[1] <= last[k]).sum())
+        further = here[1][here[1] > last[k]]
+        beyond[k] = min(beyond[k], *(further - end[k])) if len(further) else beyond[k]
+        others = place[
+            (division.source[inserted] == row[k] - 1) & (place > taken[row[k] - 1] + 2.0 * spacing[k])
+        ]
+        behind[k] = min(behind[k], length[row[k] - 1] - others.max()) if len(others) else behind[k]
+    most = reach.max(axis=1)
+    margin = np.minimum(MARGIN + 2.0 * most, 0.5 * np.minimum(beyond, behind))
+    good = (margin >= most + 2.0 * spacing) & (
+        inner + _rounded_off(task, division, vertex, knot, end, most) > 1
+    )
+    chosen = np.flatnonzero(good)[:MOST]
+    ramps = _FittedRamps(vertex, knot, row, end, exact, reach, spacing, margin, vertex + inner + 1)
+    return ramps[chosen], inner[chosen], fewest[chosen]
+
+
+def _rounded_off(
+    task: CompensationProblem, division: Subdivision, vertex: Ints, knot: Ints, end: Floats, reach: Floats
+) -> Bools:
+    """(G,) whether a parabola of ``reach`` (G,) [m] takes more than ``SHOWS`` of the tolerance off a correction that
+    changes evenly over the ramps, k d / 4 where it turns by k [m a m]."""
+    row = division.source[knot]
+    places = (division.share[motions] for motions in (vertex, knot))
+    wanted = (task.desired_path.at(at, share) for at, share in zip((row - 1, row), places, strict=True))
+    shift = [
+        division.command[motions].position - pose.position
+        for motions, pose in zip((vertex, knot), wanted, strict=True)
+    ]
+    return np.asarray(0.25 * reach * lengths(shift[1] - shift[0]) / end > SHOWS * task.tolerance)
+
+
+def _curves(task: CompensationProblem, division: Subdivision, ramps: _FittedRamps) -> Curves:
+    """Commands by which the tool is on the rounded path of the program, from before the vertex (there, where it is
+    exact) to after the ramp."""
+    sides = np.where(ramps.exact, 1.0, 2.0) * ramps.margin
+    on_ramp = np.ceil((PLACES - 1) * ramps.end / (ramps.end + sides))
+    step = ramps.end / on_ramp  # the curve turns where the ramp starts and ends: there are places
+    first = -step * np.where(ramps.exact, 0.0, np.floor(0.5 * (PLACES - 1 - on_ramp)))
+    along = (first[:, None] + step[:, None] * np.arange(PLACES)).ravel()
+    row = np.repeat(ramps.row, PLACES)
+    row = np.where(along < 0.0, row - 1, row)
+    share = along / task.desired_path.length[row]
+    share = np.where(along < 0.0, 1.0 + share, share)
+    place = commands_on_rounded_path(task, row, share).position
+    tangent = original(task, row, share)[1]
+    shape = (len(ramps.row), PLACES, 3)
+    place, tangent = place.reshape(shape), tangent.reshape(shape)
+    turn = np.stack([np.zeros(len(first)), ramps.end], axis=1)
+    # the points before the vertex, or it, and after those of the ramp
+    before = np.where(ramps.exact, ramps.vertex, ramps.vertex - 1)
+    far = division.command[before].position, division.command[ramps.after].position
+    stop = first + step * (PLACES - 1)
+    away = [np.sum((far[k] - place[:, -k]) * tangent[:, -k], axis=1) for k in (0, 1)]
+    ends = np.stack([first + np.minimum(away[0], -step), stop + np.maximum(away[1], step)], axis=1)
+    place = np.concatenate([far[0][:, None], place, far[1][:, None]], axis=1)
+    tangent = np.concatenate([tangent[:, :1], tangent, tangent[:, -1:]], axis=1)
+    return Curves(first, step, ends, turn, place, tangent)
+
+
+_V, _E = "vertex", "end"
+_STARTS: tuple[tuple[tuple[tuple[str, float], ...], ...], ...] = (
+    (((_V, 0.0), (_E, 0.0)),),
+    (
+        ((_V, 0.0), (_V, 1.0), (_E, 0.0)),
+        ((_V, -1.0), (_V, 0.0), (_E, 0.0)),
+        ((_V, 0.0), (_E, -1.0), (_E, 0.0)),
+        ((_V, 0.0), (_E, 0.0), (_E, 1.0)),
+    ),
+    (
+        ((_V, -1.0), (_V, 0.0), (_V, 1.0), (_E, 0.0)),
+        ((_V, 0.0), (_V, 1.0), (_E, -1.0), (_E, 0.0)),
+        ((_V, 0.0), (_V, 1.0), (_E, 0.0), (_E, 1.0)),
+    ),
+    (
+        ((_V, -1.0), (_V, 0.0), (_V, 1.0), (_E, 0.0), (_E, 1.0)),
+        ((_V, -1.0), (_V, 0.0), (_V, 1.0), (_E, -1.0), (_E, 0.0)),
+    ),
+    (
+        ((_V, -1.0), (_V, 0.0), (_V, 1.0), (_V, 2.0), (_E, 0.0), (_E, 1.0)),
+        ((_V, -1.0), (_V, 0.0), (_V, 1.0), (_E, -1.0), (_E, 0.0), (_E, 1.0)),
+    ),
+)
+"""Where 1, 2, ... inserted points and that of an approximated vertex may start: beside the vertex, in parts of
+``BESIDE`` of its approximation, or beside the end of the ramp, in parts of the shortest motion."""
+
+BESIDE = 0.75
+"""Share of the approximation."""
+
+
+def _starts(ramps: _FittedRamps, count: int) -> tuple[Floats, Ints]:
+    """(T, G, n) [m] from the vertex, and (T,) which of them is the vertex (the ramp's end where that is exact)."""
+    beside = np.maximum(BESIDE * ramps.reach[:, 0], ramps.spacing)
+    starts, own = [], []
+    for words in _STARTS[count - 1]:
+        starts.append(
+            np.stack([k * beside if at == _V else ramps.end + k * ramps.spacing for at, k in words], axis=1)
+        )
+        own.append(words.index((_V, 0.0)))
+    return np.stack(starts), np.array(own)
+
+
+def _exact_starts(ramps: _FittedRamps, count: int) -> tuple[Floats, Ints]:
+    """As ``_starts``, of ramps that start at an exact vertex: it stays where it is."""
+    steps = {1: ((0,),), 2: ((0, 1), (-1, 0)), 3: ((-1, 0, 1),)}.get(count, ())
+    starts = [np.stack([ramps.end + k * ramps.spacing for k in each], axis=1) for each in steps]
+    own = [each.index(0) for each in steps]
+    return np.array(starts), np.array(own, np.int64)
+
+
+def _fitted(
+    ramps: _FittedRamps, curves: Curves, count: int, allowed: float, names: Ints
+) -> dict[int, _Found]:
+    """Of the ramps that ``count`` inserted points can follow, their points by ``names`` (G,)."""
+    found: dict[int, _Found] = {}
+    for exact in (False, True):
+        some = np.flatnonzero(ramps.exact == exact)
+        if not len(some):
+            continue
+        starts, own = (_exact_starts if exact else _starts)(ramps[some], count)
+        left = np.arange(len(some))
+        for start, place in zip(starts, own.tolist(), strict=True):
+            part, curve = ramps[some[left]], curves[some[left]]
+            first = curve.first if exact else curve.ends[:, 0]
+            parameter = np.column_stack([first, start[left], curve.ends[:, 1]])
+            width = parameter.shape[1]
+            before = np.arange(width) <= (-1 if exact else place + 1)
+            reach = np.where(before, part.reach[:, :1], part.reach[:, 1:])
+            shortest = np.broadcast_to(part.spacing[:, None], (len(left), width - 1))
+            points, largest = fit_points(curve, parameter, reach, shortest, ENOUGH * allowed)
+            along = curve.nearest(points, parameter)[:, 1:-1]
+            good = largest <= allowed
+            for k in np.flatnonzero(good).tolist():
+                found[int(names[some[left[k]]])] = _Found(points[k, 1:-1], along[k], place)
+            left = left[~good]
+            if not len(left):
+                break
+    return found
+
+
+def _without_points(
+    task: CompensationProblem, division: Subdivision, ramps: _FittedRamps, found: dict[int, _Found]
+) -> tuple[Subdivision, ChosenPoints | None]:
+    """The division without the points of the ramps that were ``found``, but one of those after exact vertices; and
+    what is inserted instead."""
+    if not found:
+        return division, None
+    names = np.array(sorted(found), np.int64)
+    length = task.desired_path.length
+    dropped, own, group, row, share, place, moved = [], [], [], [], [], [], []
+    inserted = np.flatnonzero((division.role == Role.INTERMEDIATE) & (division.share < 1.0))
+    for number, name in enumerate(names.tolist()):
+        ramp, points = ramps[np.array([name])], found[name]
+        here = int(ramp.row[0])
+        mine = inserted[division.source[inserted] == here]
+        last = ramp.end[0] + 2.0 * ramp.spacing[0]
+        mine = mine[division.share[mine] * length[here] <= last]
+        kept = int(ramp.knot[0]) if ramp.exact[0] else int(ramp.vertex[0])
+        dropped += [k for k in mine.tolist() if k != kept]
+        own.append(kept)
+        moved.append(points.place[points.own])
+        fixed = float(ramp.end[0]) if ramp.exact[0] else 0.0
+        apart = APART * ramp.spacing[0]
+        along = points.along.copy()
+        along[points.own] = fixed
+        for k in range(points.own + 1, len(along)):
+            along[k] = max(along[k], along[k - 1] + apart)
+        for k in range(points.own - 1, -1, -1):
+            along[k] = min(along[k], along[k + 1] - apart)
+        for k in range(len(along)):
+            if k != points.own:
+                at = here if along[k] > 0 else here - 1
+                group.append(number)
+                row.append(at)
+                share.append(along[k] / length[at] + (0.0 if along[k] > 0 else 1.0))
+                place.append(points.place[k])
+    keep = np.ones(len(division), bool)
+    keep[dropped] = False
+    kept_motions = np.flatnonzero(keep)
+    chosen = ChosenPoints(
+        np.searchsorted(kept_motions, np.array(own)),
+        np.full(len(names), np.inf),
+        np.ones(len(names), bool),
+        np.array(group, np.int64),
+        np.array(row, np.int64),
+        np.array(share, float),
+        np.array(moved).reshape(-1, 3),
+        np.array(place, float).reshape(-1, 3),
+    )
+    return _part(division, kept_motions), chosen
+
+
+def _part(division: Subdivision, motions: Ints) -> Subdivision:
+    """The division with these ``motions`` alone."""
+    names = ("source", "role", "share", "centre", "normal", "sweep", "moved")
+    arrays = {name: getattr(division, name)[motions] for name in names}
+    command = PoseRows(len(motions), lambda rows: division.command[motions[rows]])
+    return replace(division, command=command, **arrays)

@@ -1,0 +1,129 @@
+"""Few points where a force changes: fitted as well as brute force can, as few as hold, and their errors are true."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_corner_fit import FREE, square, two_sides
+
+from postproc.compensation.corner_fit import fit_corners
+from postproc.compensation.corners import rounded_errors
+from postproc.compensation.correct import correct
+from postproc.compensation.point_fit import Curves, fit_points
+from postproc.compensation.ramp_points import NEVER
+from postproc.compensation.rounded_path import RoundedOutput
+from postproc.compensation.subdivide import subdivide
+from postproc.toolpath import Role
+
+MM = 1e-3
+END = 8.0 * MM
+
+
+def bent(slope: float) -> Curves:
+    """Along x, from -30 mm to 40 mm; y rises by ``slope`` from 0 to 8 mm."""
+    x = np.linspace(-10.0 * MM, 18.0 * MM, 561)
+    along = np.concatenate([[-30.0 * MM], x, [40.0 * MM]])
+    place = np.stack([along, slope * np.clip(along, 0.0, END), np.zeros(len(along))], axis=1)
+    tangent = np.broadcast_to([1.0, 0.0, 0.0], place.shape)
+    ends, turn = np.array([[along[0], along[-1]]]), np.array([[0.0, END]])
+    return Curves(x[:1], x[1:2] - x[:1], ends, turn, place[None], tangent[None])
+
+
+def drawn_error(points: np.ndarray, slope: float, reach: float) -> float:
+    """[m] Largest distance in y of the rounded polygon (K, 3) from the bent line, drawn point by point."""
+    length = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    limit = np.zeros(len(points))
+    limit[1:-1] = np.minimum(reach, 0.5 * np.minimum(length[:-1], length[1:]))
+    t = np.linspace(0.0, 1.0, 400)[:, None]
+    parts = []
+    for k in range(len(length)):
+        way = (points[k + 1] - points[k]) / length[k]
+        one, two = points[k] + limit[k] * way, points[k + 1] - limit[k + 1] * way
+        parts.append(one + t * (two - one))
+        if k + 2 < len(points):
+            out = points[k + 1] + limit[k + 1] * (points[k + 2] - points[k + 1]) / length[k + 1]
+            parts.append((1 - t) ** 2 * two + 2 * t * (1 - t) * points[k + 1] + t**2 * out)
+    path = np.concatenate(parts)
+    return float(np.abs(path[:, 1] - slope * np.clip(path[:, 0], 0.0, END)).max())
+
+
+def fitted(slope: float, reach: float, *start: float) -> tuple[np.ndarray, float]:
+    parameter = np.array([[-30.0 * MM, *start, 40.0 * MM]])
+    shortest = np.full((1, parameter.shape[1] - 1), 0.3 * MM)
+    points, largest = fit_points(bent(slope), parameter, np.full(parameter.shape, reach), shortest, 0.0)
+    return points[0], float(largest[0])
+
+
+@pytest.mark.parametrize("slope", [0.1, 0.5, 1.0])
+@pytest.mark.parametrize(
+    "start", [(0.0, END), (0.0, 1.5 * MM, END), (-1.0 * MM, 0.0, 1.0 * MM, END, END + MM)]
+)
+def test_the_error_of_a_fit_is_that_of_the_drawn_path(slope: float, start: tuple[float, ...]) -> None:
+    points, largest = fitted(slope, 2.0 * MM, *start)
+    assert drawn_error(points, slope, 2.0 * MM) == pytest.approx(largest, rel=0.03)
+    assert np.linalg.norm(np.diff(points, axis=0), axis=1).min() > 0.299 * MM
+
+
+@pytest.mark.parametrize("slope", [0.1, 0.4])
+def test_no_placing_of_two_points_is_better_than_the_fit(slope: float) -> None:
+    """By brute force over both, far enough apart to be each on its own: a turn by k loses k d / 8 to a parabola."""
+    _, largest = fitted(slope, 1.0 * MM, 0.0, END)
+    ends = np.array([[-30.0 * MM, 0.0, 0.0], [40.0 * MM, slope * END, 0.0]])
+    least = np.inf
+    for along in np.linspace(-0.8, 0.8, 17) * MM:
+        for aside in np.linspace(-0.2, 0.2, 33) * slope * MM:
+            one = np.array([along, slope * max(along, 0.0) + aside, 0.0])
+            two = np.array([END - along, slope * min(END - along, END) - aside, 0.0])
+            least = min(least, drawn_error(np.array([ends[0], one, two, ends[1]]), slope, 1.0 * MM))
+    assert largest < 1.02 * least
+    assert largest > 0.9 * slope * 1.0 * MM / 8
+
+
+def test_more_points_are_needed_only_for_more() -> None:
+    errors = [
+        fitted(0.5, 2.0 * MM, *start)[1] for start in [(0.0, END), (0.0, 0.5 * MM, END - 0.5 * MM, END)]
+    ]
+    assert errors[0] > 0.1 * MM
+    assert errors[1] < 0.4 * errors[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("distance", [0.5 * MM, 2.0 * MM])
+def test_a_turning_force_takes_few_points(distance: float) -> None:
+    job = square(distance)
+    result = correct(job)
+    plain = subdivide(job, result, FREE)
+    fit, division = fit_corners(job, result, plain, FREE)
+    assert rounded_errors(job, fit, division)[1].max() < job.tolerance
+    assert division.inserted <= 3
+    # as before, with the points of the corner and those of the ramp each for themselves
+    once, more = fit_corners(job, result, plain, FREE, {(2, 1.0): 99})
+    assert more.inserted > division.inserted
+    assert rounded_errors(job, once, more)[1].max() < job.tolerance
+    assert fit_corners(job, result, plain, FREE, {(2, 1.0): NEVER})[1] is plain
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("second", [1.5, -1.0])
+def test_errors_are_found_where_the_force_turns(second: float) -> None:
+    """The error has an edge there, which samples beside it do not see."""
+    job = two_sides(0.5 * MM, 0.0, second * np.array([100.0, 250.0, 50.0]))
+    result = correct(job)
+    plain = subdivide(job, result, FREE)
+    for some, division in ((result, plain), fit_corners(job, result, plain, FREE)):
+        motion, off, _ = rounded_errors(job, some, division)
+        for one, most in zip(motion, off, strict=True):
+            output = RoundedOutput(job, division, np.array([one]))
+            at = output.place(np.array([one]))
+            share = np.linspace(0.0, 1.0, 3001)
+            true = np.linalg.norm(output.deviations(np.repeat(at, len(share)), share).shift, axis=1).max()
+            assert most == pytest.approx(true, rel=0.03, abs=1e-7)
+
+
+def test_no_point_moves_beyond_its_neighbours() -> None:
+    job = square(2.0 * MM)
+    result = correct(job)
+    _, division = fit_corners(job, result, subdivide(job, result, FREE), FREE)
+    at = division.source + division.share
+    assert (np.diff(at) > 0).all()
+    assert (division.share[division.role == Role.INTERMEDIATE] > 0).all()
