@@ -11,7 +11,7 @@ from postproc.base.arrays import Floats
 from postproc.effects import EFFECTS, ComplianceLaw, Effect
 from postproc.effects.gravity_sag import GravitySag
 from postproc.identification.campaign import Campaign, Nuisances
-from postproc.identification.least_squares import Point, displacement_in
+from postproc.identification.least_squares import Point, predicted_in
 from postproc.identification.noise import Weighting
 from postproc.identification.sensitivities import columns
 from postproc.identification.unknowns import Unknown, unknowns_of, with_mechanism
@@ -108,8 +108,8 @@ def candidates(
     near: Point | None = None,
 ) -> tuple[Candidate, ...]:
     """All that may be missing in ``model``, with what it would move in ``campaign``; also what would move nothing
-    there.  ``by_direction``: only what depends on the sense of approach; ``near``: a point of ``model`` in
-    ``campaign``, to start with."""
+    there.  ``by_direction``: only what depends on the sense of approach; ``near``: the point of ``model`` in
+    ``campaign``, where it is known."""
     entries: list[Candidate] = []
     for name, effect in EFFECTS.items():
         if name == "base_offset" and campaign.tracked:
@@ -148,7 +148,7 @@ def _by_joint(
     if not unknowns:
         return []
     effect = model.terms[unknowns[0].term].effect
-    here = campaign.predicted(model, None if near is None else displacement_in(model, near))
+    here = campaign.predicted(model) if near is None else predicted_in(model, near)
     moves = np.nan_to_num(columns(campaign, model, unknowns, here, given))
     sized = model.with_values({u.key: u.parameter.null + u.parameter.scale for u in unknowns})
     there = campaign.predicted(sized, here.displacement)

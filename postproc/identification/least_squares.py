@@ -87,6 +87,11 @@ def displacement_in(model: StiffnessModel, near: Point) -> Floats:
     return displacement
 
 
+def predicted_in(model: StiffnessModel, near: Point) -> PredictedReadings:
+    """The prediction of a point as that of ``model``, which has more effects, all at their nulls."""
+    return replace(near.predicted, displacement=displacement_in(model, near))
+
+
 def with_columns(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) -> Point:
     """The point with its columns, taken here."""
     return replace(
