@@ -620,7 +620,7 @@ def test_hardware_that_is_known_is_taken(spring):
     (named,) = spring.verdict.named
     near = replace(named, evidence=replace(named.evidence, margin=2.4))
     text = paragraph(judged(spring, "named", named=(near,)))
-    assert "has a likelihood gain only 2 lower" in text
+    assert "is only 2 lower" in text
     assert "the gravity_compensator is named because the robot file describes one" in text
     assert "clearly worse" not in text
 

@@ -203,5 +203,17 @@ def is_visible(candidate: Candidate, weights: Weighting) -> bool:
     return bool((size > candidate.least).any())
 
 
+def fewest_parameters(several: Sequence[Candidate]) -> list[Candidate]:
+    """Of candidates of one effect those with fewest parameters; of those that have the same the first."""
+
+    def goes(k: int, one: Candidate) -> bool:
+        return any(
+            j != k and one.contains(other) and (j < k or not other.contains(one))
+            for j, other in enumerate(several)
+        )
+
+    return [one for k, one in enumerate(several) if not goes(k, one)]
+
+
 def names_of(choices: Sequence[Candidate]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(candidate.name for candidate in choices))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.diagnosis.candidate_fits import has_zeros
-from postproc.diagnosis.candidates import EVERY, Candidate, names_of
+from postproc.diagnosis.candidates import EVERY, Candidate, fewest_parameters, names_of
 from postproc.diagnosis.decoys import HAS_DECOYS
 from postproc.diagnosis.held_out import FOLDS, held_out_gain, regions_of, sessions_of, worst_ratio
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
@@ -310,9 +310,7 @@ def ambiguity_set(search: Search, group: int, observable: bool) -> tuple[Candida
     near = [
         r.candidate for r in against if r.margin < (-BUILT if built and observable and r.is_decoy else MARGIN)
     ]
-    # of one effect the form with fewest parameters
-    several = [mine, *near]
-    return (mine, *(c for c in near if not any(c is not one and c.contains(one) for one in several)))
+    return (mine, *(c for c in fewest_parameters([mine, *near]) if c is not mine))
 
 
 def is_implausible(estimates: Sequence[Estimate]) -> bool:

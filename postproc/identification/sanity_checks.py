@@ -70,6 +70,9 @@ FOLLOWED = 4
 PART, SHIFT_TRIED = 12, 5000
 """Readings that show that a part of a file belongs to other rows, and how many a file may have to be checked."""
 
+ENDS = 3, 8
+"""One over the share of the rows at an end of the file that is taken to be right, the larger share first."""
+
 LOADED = ("elastic", "gear", "sensor")
 """Families of effects that only a load shows."""
 
@@ -231,11 +234,11 @@ def _check_rows(campaign: Campaign, model: StiffnessModel) -> None:
     given = registered(campaign, point.predicted, every)
     if _rms(campaign.residual(point.predicted, given)[:, :3]) < FAR:
         return
-    for start in (True, False):
+    for share, start in ((share, start) for share in ENDS for start in (True, False)):
         part = every.copy()
-        part[len(part) // 3 :] = False
+        part[len(part) // share :] = False
         rows = part if start else part[::-1]
-        if len(np.unique(readings.session[rows])) < len(readings.sessions):
+        if len(np.unique(readings.session[rows])) < len(readings.sessions) or rows.sum() < PART:
             continue
         given = registered(campaign, point.predicted, rows)
         expected, _ = campaign.expected(point.predicted, given)

@@ -354,9 +354,10 @@ def _nearest(several: Sequence[Named]) -> Iterator[str]:
     elif (alias.name, alias.joint) == (named.candidate.name, named.candidate.joint) and margin < MARGIN:
         yield f"Another form of it, {alias.label}, explains nearly as much (its likelihood gain is {margin:.0f} lower)."
     elif margin < MARGIN:
+        near = f"only {margin:.0f} lower" if margin >= 0.5 else "as large or larger"
         yield (
-            f"The next best explanation{of}, {alias.label}, has a likelihood gain only {margin:.0f} lower; the"
-            f" {named.effect} is named because the robot file describes one."
+            f"The likelihood gain of the next best explanation{of}, {alias.label}, is {near}; the {named.effect} is"
+            " named because the robot file describes one."
         )
     else:
         yield (
