@@ -1,4 +1,4 @@
-"""The names that a diagnosis gives do not depend on the order of the readings, nor on the sessions they are split into."""
+"""The names that a diagnosis gives depend neither on the order of the readings nor on their sessions."""
 
 import numpy as np
 import pytest

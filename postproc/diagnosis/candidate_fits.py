@@ -17,7 +17,6 @@ from postproc.identification.least_squares import Point, at, scales, with_column
 from postproc.identification.unknowns import Unknown, unknowns_of, with_gauge, with_mechanism
 from postproc.model import StiffnessModel
 
-
 INDIFFERENT = 1.0
 """Squares, in variances of a reading, by which a value may fit worse and be as good."""
 

@@ -20,7 +20,8 @@ WORTH = 0.19
 square: what is not understood follows the joints as well, and by chance looks a little like any effect."""
 
 SLIGHT = 0.03
-"""The same where no more than scatter remains, a sixth of it: less is not worth a name, however many readings show it."""
+"""The same where no more than scatter remains, a sixth of it: less is not worth a name, however many readings show
+it."""
 
 FAR = 3.0
 """A residual counts for an effect up to so many standard deviations."""

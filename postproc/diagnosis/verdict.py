@@ -148,7 +148,9 @@ def judge(search: Search) -> Verdict:
         several = ambiguity_set(search, g, not bounded and _is_observable(candidate, estimates))
         if _of_another_course(search, candidate, -MARGIN):
             rejected.append((candidate, OTHER_COURSE))
-        elif unexplained and candidate.name not in HAS_DECOYS and _of_another_course(search, candidate, MARGIN):
+        elif (
+            unexplained and candidate.name not in HAS_DECOYS and _of_another_course(search, candidate, MARGIN)
+        ):
             rejected.append((candidate, AS_WELL))
         elif not its.is_sufficient:
             rejected.append((candidate, "no gain on held-out readings"))

@@ -131,7 +131,9 @@ def judge(trial: Trial, answer: dict, new: Path) -> dict[str, bool | float]:
         before = fresh_gap(trial, model_of(trial.files["robot.yaml"]))
         after = fresh_gap(trial, found)
         held["gap closed"] = 1.0 - after / before if before > 1e-9 else 1.0
-        solved = held.get("named or in the set", word == "nothing_missing") and not held["a name that is wrong"]
+        solved = (
+            held.get("named or in the set", word == "nothing_missing") and not held["a name that is wrong"]
+        )
         if solved and before > LITTLE * trial.sigma:
             held[NEW_OVER_OLD] = after / before
         stated = answer.get("largest_disagreement_mm")
@@ -208,7 +210,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"{row}: " + ", ".join(f"{n} {word}" for word, n in sorted(words.items())))
         for key, values in counts.items():
             if key == NEW_OVER_OLD:
-                print(f"  {key:36} {np.median(values):.3f} in the median, {max(values):.3f} at worst, {len(values)}")
+                print(
+                    f"  {key:36} {np.median(values):.3f} in the median, {max(values):.3f} at worst, {len(values)}"
+                )
             elif any(isinstance(v, float) for v in values):
                 middle, mean = 100 * np.median(values), 100 * np.mean(values)
                 print(f"  {key:36} {middle:.1f} % in the median, {mean:.1f} in the mean of {len(values)}")

@@ -172,7 +172,11 @@ def approach(number: int, seed: int) -> Trial:
     design = replace(design, told=told, time=None, temperature=None)
     if not told:  # the file's order is not that of the approach either
         design = replace(design, senses=rng.choice([-1.0, 1.0], design.q.shape))
-    sigma, size, without = measured.scatter(design, model_of(raw)), 0.0, measured.observed(as_filed(True), design)
+    sigma, size, without = (
+        measured.scatter(design, model_of(raw)),
+        0.0,
+        measured.observed(as_filed(True), design),
+    )
     for more in range(20):
         h, size = hidden.drawn(name, rng), float(rng.uniform(1.0, 4.0)) * 1.1**more
         scene = h.into(as_filed(True), size)
