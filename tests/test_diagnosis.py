@@ -10,13 +10,13 @@ import pytest
 from measured import MARKERS, on_markers, plan, robot
 
 from postproc.base.geometry import Poses
-from postproc.diagnosis.candidates import candidates, is_visible
+from postproc.diagnosis.candidates import candidates, fewest_parameters, is_visible
 from postproc.diagnosis.decoys import AlternativeForm, decoys
 from postproc.diagnosis.diagnosis import diagnose
 from postproc.diagnosis.nonlinear_effects import evaluate_at_size, whole
 from postproc.diagnosis.residual_patterns import residual_patterns
 from postproc.diagnosis.search import SHARED, drop_confounded, limit_shared_scatter, model_unknowns, search
-from postproc.diagnosis.selection import complexity_penalty
+from postproc.diagnosis.selection import complexity_penalty, counts, explained, problem
 from postproc.diagnosis.verdict import (
     BUILT,
     MARGIN,
@@ -335,3 +335,39 @@ def test_a_few_poses_do_not_foretell_a_campaign():
     assert both > small > 0
     assert np.isnan(held_out_gain(found, found.explained, group, 0 * rows))
     assert judge(found).word in ("named", "ambiguous")
+
+
+def linear_problem(count, size, far=0.0):
+    """``count`` readings of unit variance and one group, whose part of them has the root mean square ``size``; ``far``:
+    what two of the readings that it moves have beside that."""
+    rng = np.random.default_rng(3)
+    column = rng.normal(size=(count, 1))
+    residual = rng.normal(size=count) + size * column[:, 0]
+    most = np.argsort(-np.abs(column[:, 0]))[:2]
+    residual[most] += far * np.sign(column[most, 0])
+    reach = np.array([[-1e9, 1e9]])
+    return problem(residual, np.zeros((count, 0)), [(column, reach)], count, True)
+
+
+@pytest.mark.parametrize(
+    ("count", "size", "far", "named"),
+    [(3000, 0.1, 0.0, False), (3000, 0.3, 0.0, True), (200, 0.0, 12.0, False), (200, 0.5, 0.0, True)],
+)
+def test_what_is_worth_a_name(count, size, far, named):
+    """A tenth of the scatter is not, however clearly many readings show it, nor what two readings far off ask for."""
+    given = linear_problem(count, size, far)
+    without, with_ = explained(given, ()), explained(given, (0,))
+    assert without.squares - with_.squares > 20.0
+    assert counts(given, without, with_, 30) == named
+
+
+def test_of_two_forms_with_the_same_parameters_one_stays():
+    model = stated()
+    campaign = campaign_of(model, in_robot_frame=True, deflection=False)
+    every = [c for c in candidates(campaign, model, campaign.start()) if c.name == "joint_offset"]
+    (whole,) = [c for c in every if c.joint == "all joints"]
+    one = next(c for c in every if c.joint == "A3")
+    same = replace(whole, unknowns=one.unknowns)
+    assert fewest_parameters([one, same]) == [one]
+    assert fewest_parameters([same, one]) == [same]
+    assert fewest_parameters([whole, one]) == [one]

@@ -7,11 +7,11 @@ from blind.real_worlds import TRIALS
 
 @pytest.fixture(scope="module")
 def diagnosed():
-    """``diagnosed(row, number)``: the trial, what is counted of it, and the answer."""
+    """``diagnosed(row, number, seed)``: the trial, what is counted of it, and the answer."""
     process = command.Diagnosing()
 
-    def run(row, number):
-        trial = TRIALS[row](number, 1)
+    def run(row, number, seed=1):
+        trial = TRIALS[row](number, seed)
         return trial, *real_command.run(trial, process)
 
     yield run
@@ -110,3 +110,35 @@ def test_reflectors_that_moved_less_than_a_wrong_geometry_misses(diagnosed):
     _, held, answer = diagnosed("remounted", 5)
     assert "IDN032" in {finding["code"] for finding in answer["findings"]}
     assert held["gap closed"] > 0.95
+
+
+@pytest.mark.slow
+def test_sides_of_a_deflection_are_read_from_the_middle_of_the_gap(diagnosed):
+    """Loaded minus unloaded: where the gear was on the load's side already, nothing moves."""
+    _, held, answer = diagnosed("approach", 2, seed=2)
+    assert answer["verdict"] == "named"
+    assert held["named or in the set"]
+    assert held["gap closed"] > 0.9
+
+
+@pytest.mark.slow
+def test_a_weight_at_the_edge_of_a_gap_stays_as_stated(diagnosed):
+    """Which poses change sides allows weights between two values, whatever the derivative at either says."""
+    _, held, answer = diagnosed("approach", 0, seed=2)
+    assert held["named or in the set"]
+    assert answer["refitted"] == []
+    assert held[real_command.NEW_OVER_OLD] < 0.5
+
+
+@pytest.mark.slow
+def test_a_wave_of_another_order_is_no_harmonic(diagnosed):
+    _, held, answer = diagnosed("remainder", 1, seed=2)
+    assert answer["verdict"] == "partly_named"
+    assert real_command.pairs(answer) == {("link_geometry", "A3")}
+    assert held["gap closed"] > 0.9
+
+
+@pytest.mark.slow
+def test_rows_shifted_from_the_first_sixth_on(diagnosed):
+    _, _, answer = diagnosed("lost", 1, seed=2)
+    assert "IDN034" in {finding["code"] for finding in answer["findings"]}

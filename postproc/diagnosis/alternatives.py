@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.base.arrays import Floats
 from postproc.diagnosis.candidate_fits import composed, point_without, with_effects
-from postproc.diagnosis.candidates import Candidate
+from postproc.diagnosis.candidates import Candidate, fewest_parameters
 from postproc.diagnosis.decoys import decoys
 from postproc.diagnosis.nonlinear_effects import evaluate_at_size
 from postproc.diagnosis.search_result import Alternative, Linear
@@ -92,13 +92,8 @@ def find_alternatives(
                 twin = _predicts(beside(given, rest, columns), signal, variance)
                 of_mine.append(Alternative(mine.key, instead, worse, paid(columns) - own, False, twin))
         # of one effect the form with fewest parameters that predicts the same
-        of_mine = [
-            a
-            for a in of_mine
-            if not (
-                a.twin and any(b.twin and b is not a and a.candidate.contains(b.candidate) for b in of_mine)
-            )
-        ]
+        twins = fewest_parameters([a.candidate for a in of_mine if a.twin])
+        of_mine = [a for a in of_mine if not a.twin or any(a.candidate is one for one in twins)]
         of_mine.sort(key=lambda alternative: (not alternative.twin, alternative.margin))
         for k, alternative in enumerate(of_mine[:RIVALS]):
             if alternative.margin < max(CLOSE, CLOSE_SHARE * gain / variance):

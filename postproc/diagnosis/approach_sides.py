@@ -75,6 +75,8 @@ def diagnose_sides(
 def _may_explain(campaign: Campaign, done: Diagnosis) -> bool:
     """Whether all effects of the sides of approach of ``campaign`` together, beside what was chosen without them,
     explain enough of the residual for a diagnosis of its own."""
+    if any(candidate.effect.by_direction for candidate in done.search.chosen):
+        return True  # it does something else on other sides
     fitted = done.search.final
     sample = sample_of(campaign)
     found = candidates(sample, fitted.model, fitted.point.given, by_direction=True)
@@ -112,8 +114,13 @@ def _is_better(other: Diagnosis, done: Diagnosis) -> bool:
 
 def _shown(done: Diagnosis) -> list[tuple[int, Floats]]:
     """Joints whose turn by one width, to one side or the other at each visit, explains the residual best, and the
-    sides (R,): -1 where the joint stopped above its place."""
-    fitted = done.base
+    sides (R,): -1 where the joint stopped above its place.
+
+    Where an effect of approach was found with every gear in the middle of its gap, residuals are those from there; of
+    a deflection the side is that of the unloaded joint, which is subtracted."""
+    gaps = any(candidate.effect.by_direction for candidate in done.search.chosen)
+    fitted = done.search.confirmed if gaps else done.base
+    above = -1.0 if fitted.campaign.readings.deflection and gaps else 1.0
     campaign = fitted.campaign
     weight = fitted.plain_weights.weight[:, :3] ** 2
     visit = _visits(campaign.pose)
@@ -126,7 +133,9 @@ def _shown(done: Diagnosis) -> list[tuple[int, Floats]]:
         along = np.bincount(visit, (weight * turn * residual).sum(axis=1))
         size = np.bincount(visit, (weight * turn * turn).sum(axis=1))
         gain = np.abs(along).sum() ** 2 / max(float(size.sum()), 1e-300) - BIT * len(along)
-        entries.append((float(gain), names.index(variable.split(" over ")[0]), -np.sign(along)[visit]))
+        entries.append(
+            (float(gain), names.index(variable.split(" over ")[0]), -above * np.sign(along)[visit])
+        )
     entries.sort(key=lambda entry: -entry[0])
     return [(joint, sides) for gain, joint, sides in entries[:JOINTS] if gain > 0]
 

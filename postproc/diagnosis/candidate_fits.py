@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -13,9 +13,12 @@ from postproc.effects.joint_offset import JointOffset
 from postproc.effects.link_geometry import LinkGeometry
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
-from postproc.identification.least_squares import Point, at, scales
+from postproc.identification.least_squares import Point, at, scales, with_columns
 from postproc.identification.unknowns import Unknown, unknowns_of, with_gauge, with_mechanism
 from postproc.model import StiffnessModel
+
+INDIFFERENT = 1.0
+"""Squares, in variances of a reading, by which a value may fit worse and be as good."""
 
 
 def in_scales(fitted: Fit, unknowns: Sequence[Unknown]) -> Floats:
@@ -35,7 +38,35 @@ def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate]) -> 
     additional = [
         replace(u, value=start.get(u.key, u.value)) if u.prior is None else u for u in with_gauge(unknowns)
     ]
-    return fit(campaign, model.with_values(start), [*own, *additional], given=base.point.given)
+    fitted = fit(campaign, model.with_values(start), [*own, *additional], given=base.point.given)
+    if not any(candidate.effect.by_direction for candidate in chosen):
+        return fitted
+    return put_back(campaign, fitted, {u.key for u in own})
+
+
+def put_back(campaign: Campaign, fitted: Fit, own: Set[tuple[int, str]]) -> Fit:
+    """The fit with those parameters of the robot file, ``own``, at their stated values that are clearly elsewhere by
+    their intervals, but fit as well there: where the sides of a gap change, an interval by derivatives is too narrow.
+    It reaches to the value that was found."""
+
+    def squares(point: Point) -> float:
+        residual = fitted.plain_weights(np.nan_to_num(point.residual, nan=np.inf))
+        return float(residual @ residual) / fitted.factor
+
+    point, covariance = fitted.point, fitted.covariance.copy()
+    for k, estimate in enumerate(fitted.estimates):
+        unknown, off = estimate.unknown, abs(estimate.value - estimate.unknown.value)
+        if unknown.key not in own or not off > estimate.ci95 > 0:
+            continue
+        model = point.model.with_values({unknown.key: unknown.value})
+        there = at(campaign, model, point.given, point.predicted.displacement)
+        if squares(there) < squares(point) + INDIFFERENT:
+            point = there
+            covariance[k] *= off / estimate.ci95
+            covariance[:, k] *= off / estimate.ci95
+    if point is fitted.point:
+        return fitted
+    return replace(fitted, point=with_columns(campaign, point, fitted.unknowns), covariance=covariance)
 
 
 def _begun(

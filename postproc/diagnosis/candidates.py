@@ -11,6 +11,7 @@ from postproc.base.arrays import Floats
 from postproc.effects import EFFECTS, ComplianceLaw, Effect
 from postproc.effects.gravity_sag import GravitySag
 from postproc.identification.campaign import Campaign, Nuisances
+from postproc.identification.least_squares import Point, predicted_in
 from postproc.identification.noise import Weighting
 from postproc.identification.sensitivities import columns
 from postproc.identification.unknowns import Unknown, unknowns_of, with_mechanism
@@ -100,10 +101,15 @@ class Candidate:
 
 
 def candidates(
-    campaign: Campaign, model: StiffnessModel, given: Nuisances, by_direction: bool = False
+    campaign: Campaign,
+    model: StiffnessModel,
+    given: Nuisances,
+    by_direction: bool = False,
+    near: Point | None = None,
 ) -> tuple[Candidate, ...]:
     """All that may be missing in ``model``, with what it would move in ``campaign``; also what would move nothing
-    there.  ``by_direction``: only what depends on the sense of approach."""
+    there.  ``by_direction``: only what depends on the sense of approach; ``near``: the point of ``model`` in
+    ``campaign``, where it is known."""
     entries: list[Candidate] = []
     for name, effect in EFFECTS.items():
         if name == "base_offset" and campaign.tracked:
@@ -117,11 +123,10 @@ def candidates(
             missing = [
                 u for u in unknowns_of(model, term) if u.stated is None and u.value == u.parameter.null
             ]
-            entries += _by_joint(campaign, model, given, [u for u in missing if not u.fixed])
+            entries += _by_joint(campaign, model, given, [u for u in missing if not u.fixed], near)
         for wider in () if known else _widened(model, effect):
-            entries += _by_joint(
-                campaign, wider, given, [u for u in unknowns_of(wider, len(model.terms)) if not u.fixed]
-            )
+            unknowns = [u for u in unknowns_of(wider, len(model.terms)) if not u.fixed]
+            entries += _by_joint(campaign, wider, given, unknowns, near)
     return tuple(entries)
 
 
@@ -133,13 +138,17 @@ def _widened(model: StiffnessModel, effect: type[Effect]) -> list[StiffnessModel
 
 
 def _by_joint(
-    campaign: Campaign, model: StiffnessModel, given: Nuisances, unknowns: Sequence[Unknown]
+    campaign: Campaign,
+    model: StiffnessModel,
+    given: Nuisances,
+    unknowns: Sequence[Unknown],
+    near: Point | None,
 ) -> list[Candidate]:
     """The unknowns of one effect, joint by joint."""
     if not unknowns:
         return []
     effect = model.terms[unknowns[0].term].effect
-    here = campaign.predicted(model)
+    here = campaign.predicted(model) if near is None else predicted_in(model, near)
     moves = np.nan_to_num(columns(campaign, model, unknowns, here, given))
     sized = model.with_values({u.key: u.parameter.null + u.parameter.scale for u in unknowns})
     there = campaign.predicted(sized, here.displacement)
@@ -192,6 +201,18 @@ def is_visible(candidate: Candidate, weights: Weighting) -> bool:
     """Whether the readings would show the effect at all."""
     size = np.linalg.norm(weights(candidate.columns), axis=0)
     return bool((size > candidate.least).any())
+
+
+def fewest_parameters(several: Sequence[Candidate]) -> list[Candidate]:
+    """Of candidates of one effect those with fewest parameters; of those that have the same the first."""
+
+    def goes(k: int, one: Candidate) -> bool:
+        return any(
+            j != k and one.contains(other) and (j < k or not other.contains(one))
+            for j, other in enumerate(several)
+        )
+
+    return [one for k, one in enumerate(several) if not goes(k, one)]
 
 
 def names_of(choices: Sequence[Candidate]) -> tuple[str, ...]:

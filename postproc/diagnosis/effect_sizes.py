@@ -10,7 +10,7 @@ import numpy as np
 from postproc.base.arrays import Floats
 from postproc.diagnosis.candidates import Candidate
 from postproc.diagnosis.search_result import Search
-from postproc.diagnosis.selection import CHANCE, EXCEEDED, WORTH, explained, scatter
+from postproc.diagnosis.selection import CHANCE, EXCEEDED, SLIGHT, WORTH, explained, scatter
 from postproc.diagnosis.verdict import Named
 from postproc.identification.fit import Fit
 from postproc.identification.least_squares import at
@@ -52,9 +52,8 @@ def _needed(search: Search, rank: int) -> float:
 
     given, last = search.linear.problem, search.explained
     by_chance = float(chdtri(max(rank, 1), CHANCE / len(given.places)))
-    if given.known and scatter(given, last) <= EXCEEDED:
-        return by_chance
-    return max(by_chance, WORTH / (1.0 - WORTH) * max(1, given.freedom - last.rank))
+    worth = SLIGHT if given.known and scatter(given, last) <= EXCEEDED else WORTH
+    return max(by_chance, worth / (1.0 - worth) * max(1, given.freedom - last.rank))
 
 
 def moved(final: Fit, named: Named) -> Floats:

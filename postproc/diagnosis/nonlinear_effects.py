@@ -10,7 +10,7 @@ import numpy as np
 from postproc.base.arrays import Floats
 from postproc.identification.bounded import bounded_least_squares
 from postproc.identification.campaign import Campaign
-from postproc.identification.least_squares import Point, at, scales, with_columns
+from postproc.identification.least_squares import Point, at, displacement_in, scales, with_columns
 from postproc.identification.unknowns import Unknown
 from postproc.model import StiffnessModel
 
@@ -18,6 +18,12 @@ STEPS = 8
 
 SAME = 1e-3
 """Share of the remaining squares by which a step must gain to be followed by another."""
+
+STRAIGHT = 0.01
+"""Share of a step's effect that may come otherwise than foreseen, where another step gains nothing more."""
+
+ROUGH = 1e-11
+"""[rad, m] What may remain of the displacement to an equilibrium while a size is searched for."""
 
 DAMPING = 1e-3
 """Of a column's length."""
@@ -54,15 +60,14 @@ def evaluate_at_size(
     high = (np.array([u.parameter.upper for u in unknowns]) - null) / scale
     target = outside(point.residual[:, :, None])[:, 0]
 
-    def taken(x: Floats, start: Floats | None) -> tuple[Point, Floats]:
+    def taken(x: Floats, start: Floats) -> tuple[Point, Floats]:
         values = {u.key: v for u, v in zip(unknowns, (null + x * scale).tolist(), strict=True)}
-        there = at(campaign, model.with_values(values), point.given, start)
+        there = at(campaign, model.with_values(values), point.given, start, ROUGH)
         does = np.nan_to_num(point.residual - there.residual)
         return there, does
 
     x = np.clip(np.ones(len(unknowns)), low, high)
-    near = point.predicted.displacement
-    there, does = taken(x, near if near.shape[1] == model.chain.size else None)
+    there, does = taken(x, displacement_in(model, point))
     remaining = target - outside(does[:, :, None])[:, 0]
     for _ in range(STEPS):
         there = with_columns(campaign, there, unknowns)
@@ -77,8 +82,11 @@ def evaluate_at_size(
             step = 0.3 * step
         else:
             break
+        foreseen = matrix @ (trial - x)
+        astray = remaining - foreseen - rest
         x, there, does, remaining = trial, moved, did, rest
-        if before - remaining @ remaining < SAME * before:
+        straight = astray @ astray < STRAIGHT**2 * (foreseen @ foreseen)
+        if straight or before - remaining @ remaining < SAME * before:
             break
     if there.columns is None:
         there = with_columns(campaign, there, unknowns)

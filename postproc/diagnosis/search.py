@@ -79,7 +79,9 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
     tried: set[frozenset[Key]] = set()
     # what a missing effect does to all readings of a pose looks like an error that they share
     weights = replace(base.weights, shared=0.0)
-    every = drop_confounded(base, weights, candidates(campaign, base.model, base.point.given))
+    every = drop_confounded(
+        base, weights, candidates(campaign, base.model, base.point.given, near=base.point)
+    )
     shown = [c for c in every if is_visible(c, weights) and c.key not in banned]
     hidden = tuple(c for c in every if not is_visible(c, weights))
     while True:

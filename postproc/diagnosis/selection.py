@@ -19,6 +19,13 @@ WORTH = 0.19
 """Share of the remaining squares that an effect must explain where more than scatter remains, a tenth of the root mean
 square: what is not understood follows the joints as well, and by chance looks a little like any effect."""
 
+SLIGHT = 0.03
+"""The same where no more than scatter remains, a sixth of it: less is not worth a name, however many readings show
+it."""
+
+FAR = 3.0
+"""A residual counts for an effect up to so many standard deviations."""
+
 CHANCE = 0.001
 """Probability that among all groups any is taken in although none is there."""
 
@@ -238,8 +245,12 @@ def counts(given: Problem, without: Explained, with_: Explained, among: int) -> 
     if freedom < 3:
         return False
     variance, gain = scatter(given, with_), without.squares - with_.squares
-    if (variance > EXCEEDED or not given.known) and gain < WORTH * without.squares:
+    if gain < (WORTH if variance > EXCEEDED or not given.known else SLIGHT) * without.squares:
         return False
+    # what a few readings far out ask for is no effect
+    limit = FAR * np.sqrt(variance)
+    far = [np.clip(residual_of(given, one), -limit, limit) for one in (without, with_)]
+    gain = min(gain, float(far[0] @ far[0] - far[1] @ far[1]))
     return probability(given, gain, with_.rank - without.rank, variance, freedom) * among < CHANCE
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.diagnosis.candidate_fits import has_zeros
-from postproc.diagnosis.candidates import EVERY, Candidate, names_of
+from postproc.diagnosis.candidates import EVERY, Candidate, fewest_parameters, names_of
 from postproc.diagnosis.decoys import HAS_DECOYS
 from postproc.diagnosis.held_out import FOLDS, held_out_gain, regions_of, sessions_of, worst_ratio
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
@@ -69,6 +69,7 @@ WORST = 1.1
 
 
 NOT_ENOUGH = "too much would remain for a name"
+AS_WELL = "another course over the same joint explains as much, and more remains than scatter"
 OTHER_COURSE = "the readings follow another course than that of this effect"
 PART_OF_COURSE = "what it would explain is a part of that other course"
 SIZE_UNDETERMINED = "it would have to be unusually large, and the readings hardly determine its size"
@@ -137,13 +138,20 @@ def judge(search: Search) -> Verdict:
     named, rejected, aliases = [], [], []
     zeros: list[tuple[Candidate, Evidence]] = []
     groups: list[int] = []
+    chi2, unexplained = reduced_chi2_of(search, last)
+    patterns = residual_patterns(search.confirmed, chance=STRUCTURE)
+    unexplained = unexplained or bool(patterns)
     for g in last.groups:
         candidate, its = linear.candidates[g], _evidence(search, last, g)
         estimates = _estimates(search.confirmed, candidate, search)
         bounded = all(e.at_bound for e in estimates)
         several = ambiguity_set(search, g, not bounded and _is_observable(candidate, estimates))
-        if _of_another_course(search, candidate):
+        if _of_another_course(search, candidate, -MARGIN):
             rejected.append((candidate, OTHER_COURSE))
+        elif (
+            unexplained and candidate.name not in HAS_DECOYS and _of_another_course(search, candidate, MARGIN)
+        ):
+            rejected.append((candidate, AS_WELL))
         elif not its.is_sufficient:
             rejected.append((candidate, "no gain on held-out readings"))
         elif its.worst > WORST:
@@ -162,9 +170,6 @@ def judge(search: Search) -> Verdict:
             aliases.append(several)
             if has_zeros(candidate):
                 zeros.append((candidate, its))
-    chi2, unexplained = reduced_chi2_of(search, last)
-    patterns = residual_patterns(search.confirmed, chance=STRUCTURE)
-    unexplained = unexplained or bool(patterns)
     bare, _ = reduced_chi2_of(search, explained(linear.problem, ()))
     # two forms of one effect on one joint do not make its name uncertain
     sets = tuple(a for a in aliases if len({(c.name, c.joint) for c in a}) > 1)
@@ -307,9 +312,7 @@ def ambiguity_set(search: Search, group: int, observable: bool) -> tuple[Candida
     near = [
         r.candidate for r in against if r.margin < (-BUILT if built and observable and r.is_decoy else MARGIN)
     ]
-    # of one effect the form with fewest parameters
-    several = [mine, *near]
-    return (mine, *(c for c in near if not any(c is not one and c.contains(one) for one in several)))
+    return (mine, *(c for c in fewest_parameters([mine, *near]) if c is not mine))
 
 
 def is_implausible(estimates: Sequence[Estimate]) -> bool:
@@ -319,10 +322,11 @@ def is_implausible(estimates: Sequence[Estimate]) -> bool:
     return bool(sizes) and all(size > UNUSUAL * scale and wide > 0.5 * size for size, scale, wide in sizes)
 
 
-def _of_another_course(search: Search, candidate: Candidate) -> bool:
-    """Whether another course over the same joint or time, one that no effect has, clearly explains more."""
+def _of_another_course(search: Search, candidate: Candidate, limit: float) -> bool:
+    """Whether another course over the same joint or time, one that no effect has, is a lesser explanation by less than
+    ``limit``: below zero a clearly better one."""
     against = [r for r in search.rivals if r.of == candidate.key and r.is_decoy and r.fitted]
-    return any(r.margin < -MARGIN for r in against)
+    return any(r.margin < limit for r in against)
 
 
 def _in_another_course(search: Search, last: Explained, group: int) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.base.arrays import Floats
 from postproc.identification.bounded import bounded_least_squares
-from postproc.identification.campaign import LARGEST_SCALE, Campaign, Nuisances, PredictedReadings
+from postproc.identification.campaign import LARGEST_SCALE, REST, Campaign, Nuisances, PredictedReadings
 from postproc.identification.noise import Weighting
 from postproc.identification.sensitivities import columns
 from postproc.identification.unknowns import Unknown
@@ -61,10 +61,35 @@ class Point:
         return np.array([self.model.terms[u.term].values[u.parameter.name] for u in unknowns])
 
 
-def at(campaign: Campaign, model: StiffnessModel, given: Nuisances, start: Floats | None = None) -> Point:
-    """The point of ``model`` with nuisances ``given``; ``start`` (S, m) [rad, m]: displacements nearby."""
-    predicted = campaign.predicted(model, start)
+def at(
+    campaign: Campaign,
+    model: StiffnessModel,
+    given: Nuisances,
+    start: Floats | None = None,
+    tolerance: float = REST,
+) -> Point:
+    """The point of ``model`` with nuisances ``given``; ``start`` (S, m) [rad, m]: displacements nearby; ``tolerance``
+    as of the equilibrium."""
+    predicted = campaign.predicted(model, start, tolerance)
     return Point(model, given, predicted, campaign.residual(predicted, given))
+
+
+def displacement_in(model: StiffnessModel, near: Point) -> Floats:
+    """(S, m) [rad, m] displacements of a point as those of ``model``, whose coordinates may be more."""
+    own, wider = near.model.chain, model.chain
+    if own.names == wider.names:
+        return near.predicted.displacement
+    displacement = np.zeros((len(near.predicted.displacement), wider.size))
+    both = [name for name in own.names if name in wider.index]
+    displacement[:, [wider.index[name] for name in both]] = near.predicted.displacement[
+        :, [own.index[name] for name in both]
+    ]
+    return displacement
+
+
+def predicted_in(model: StiffnessModel, near: Point) -> PredictedReadings:
+    """The prediction of a point as that of ``model``, which has more effects, all at their nulls."""
+    return replace(near.predicted, displacement=displacement_in(model, near))
 
 
 def with_columns(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) -> Point:

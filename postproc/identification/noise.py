@@ -170,5 +170,8 @@ def _together(pose: Ints, u: Floats, values: Floats) -> Floats:
 def _by_pose(pose: Ints, values: Floats) -> Floats:
     """Sums (poses, ...) of ``values`` (R, ...)."""
     total = np.zeros((int(pose.max()) + 1, *values.shape[1:]))
-    np.add.at(total, pose, values)
+    order = np.argsort(pose, kind="stable")
+    ordered = pose[order]
+    first = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1]))
+    total[ordered[first]] = np.add.reduceat(values[order], first, axis=0)
     return total

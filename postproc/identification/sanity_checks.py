@@ -14,6 +14,7 @@ import numpy as np
 
 from postproc.base.arrays import Floats
 from postproc.base.findings import Finding, Refusal
+from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
 from postproc.identification.campaign import Campaign
 from postproc.identification.least_squares import at, bounded_step, descended, reach, with_columns
@@ -21,7 +22,7 @@ from postproc.identification.noise import noise_of, weighting
 from postproc.identification.registration import registered
 from postproc.identification.unknowns import Unknown
 from postproc.measurements import Readings
-from postproc.model import StiffnessModel
+from postproc.model import StiffnessModel, approach
 
 TURN = 6.6
 """[deg] A little more than the radians of a full turn."""
@@ -68,6 +69,9 @@ FOLLOWED = 4
 
 PART, SHIFT_TRIED = 12, 5000
 """Readings that show that a part of a file belongs to other rows, and how many a file may have to be checked."""
+
+ENDS = 3, 8
+"""One over the share of the rows at an end of the file that is taken to be right, the larger share first."""
 
 LOADED = ("elastic", "gear", "sensor")
 """Families of effects that only a load shows."""
@@ -182,15 +186,13 @@ def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unkn
         some = np.arange(len(campaign))
     few = campaign.readings.part(some)
     here, _ = _remaining_share(Campaign(few, campaign.stated_tool), model, unknowns)
-    tried = [
-        (words, Campaign(changed, campaign.stated_tool)) for words, changed in _alternatives(few, campaign)
-    ]
+    tried = list(_alternatives(few, campaign))
     # the linear problem shows which changes may help
-    sizes = [_remaining_share(changed, model, unknowns, linear=True)[0] for _, changed in tried]
-    nearest = [tried[k] for k in np.argsort(sizes, kind="stable")[:FOLLOWED]]
+    sizes = _first_steps([changed for _, changed in tried], campaign.stated_tool, model, unknowns)
+    nearest = [tried[k] for k in np.argsort(sizes, kind="stable")[:FOLLOWED] if sizes[k] < here]
     best, word = np.inf, ""
     for words, changed in nearest:
-        there = _remaining_share(changed, model, unknowns)[0]
+        there = _remaining_share(Campaign(changed, campaign.stated_tool), model, unknowns)[0]
         if there < best:
             best, word = there, words
     file = str(campaign.readings.files[0]) if campaign.readings.files else ""
@@ -232,11 +234,11 @@ def _check_rows(campaign: Campaign, model: StiffnessModel) -> None:
     given = registered(campaign, point.predicted, every)
     if _rms(campaign.residual(point.predicted, given)[:, :3]) < FAR:
         return
-    for start in (True, False):
+    for share, start in ((share, start) for share in ENDS for start in (True, False)):
         part = every.copy()
-        part[len(part) // 3 :] = False
+        part[len(part) // share :] = False
         rows = part if start else part[::-1]
-        if len(np.unique(readings.session[rows])) < len(readings.sessions):
+        if len(np.unique(readings.session[rows])) < len(readings.sessions) or rows.sum() < PART:
             continue
         given = registered(campaign, point.predicted, rows)
         expected, _ = campaign.expected(point.predicted, given)
@@ -309,28 +311,47 @@ def _badly(campaign: Campaign, remaining: float, signal: float, share: float) ->
     return remaining > (share * signal if campaign.readings.deflection else FAR)
 
 
+def _first_steps(
+    tried: Sequence[Readings], tool: Poses | None, model: StiffnessModel, unknowns: Sequence[Unknown]
+) -> list[float]:
+    """[m] root mean square of what the first step of a fit foresees to remain of each of ``tried``, which differ in
+    angles, loads and values; of absolute readings what a registration leaves."""
+    if not tried[0].deflection:
+        return [_remaining_share(Campaign(one, tool), model, unknowns)[0] for one in tried]
+    # the states of all at once
+    count = len(tried[0])
+    came = [approach(one.q) if one.direction is None else one.direction for one in tried]
+    joined = replace(
+        tried[0].part(np.tile(np.arange(count), len(tried))),
+        q=np.concatenate([one.q for one in tried]),
+        wrench=np.concatenate([one.wrench for one in tried]),
+        value=np.concatenate([one.value for one in tried]),
+        direction=np.concatenate(came),
+    )
+    campaign = Campaign(joined, tool)
+    point = with_columns(campaign, at(campaign, model, campaign.start()), unknowns)
+    columns = np.nan_to_num(np.concatenate(point.taken, axis=2))
+    limits, sizes = reach(campaign, point, unknowns), []
+    for k, one in enumerate(tried):
+        rows = slice(k * count, (k + 1) * count)
+        residual = point.residual[rows]
+        weights = weighting(campaign.seen_in(np.arange(count)), noise_of(one), residual)
+        step = bounded_step(weights(columns[rows]), weights(residual), *limits, len(unknowns))
+        sizes.append(_rms(residual - columns[rows] @ step))
+    return sizes
+
+
 def _remaining_share(
-    campaign: Campaign,
-    model: StiffnessModel,
-    unknowns: Sequence[Unknown],
-    fitted: bool = False,
-    linear: bool = False,
+    campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unknown], fitted: bool = False
 ) -> tuple[float, float]:
     """[m] root mean square of what a fit leaves (of absolute readings, unless ``fitted``, a registration alone), and of
-    what was measured; ``linear``: as it is foreseen of the first step."""
+    what was measured."""
     rows = np.ones(len(campaign), bool)
     point = at(campaign, model, campaign.start())
     given = registered(campaign, point.predicted, rows)
     point = replace(point, given=given, residual=campaign.residual(point.predicted, given))
     if campaign.readings.deflection or fitted:
         weights = weighting(campaign, noise_of(campaign.readings), point.residual)
-        if linear:
-            point = with_columns(campaign, point, unknowns)
-            columns = np.nan_to_num(np.concatenate(point.taken, axis=2))
-            step = bounded_step(
-                weights(columns), weights(point.residual), *reach(campaign, point, unknowns), len(unknowns)
-            )
-            return _rms(point.residual - columns @ step), _rms(campaign.readings.value)
         point = descended(campaign, point, unknowns, weights, max_steps=3)
     return _rms(point.residual), _rms(campaign.readings.value)
 

@@ -13,32 +13,10 @@ from postproc.diagnosis.verdict import MARGIN, Named
 from postproc.identification.fit import Estimate
 from postproc.report.diagnosed import Diagnosed
 from postproc.report.diagnosed_limits import conditional, not_tested
+from postproc.report.diagnosed_names import NOUNS, in_words
 from postproc.report.formatting import count, fixed, listed, shown_unit
 from postproc.report.formatting import millimetres as _mm
 from postproc.report.terminal import short_names
-
-NOUNS = {
-    "joint_compliance": "compliance of {joints}: the gear deflects in proportion to the torque",
-    "tool_compliance": "compliance of the tool: cutter, holder and spindle deflect",
-    "gravity_compensator": "a gravity compensator across {joints}: a spring whose torque follows the angle",
-    "link_gravity": "the arm's own weight beyond {joints}: it deflects the arm",
-    "gravity_sag": "sag of {joints} under the arm's own weight: weight times compliance, of which neither is known",
-    "payload": "a weight on the flange: it deflects the arm",
-    "base_compliance": "compliance of the foundation: the whole robot tilts under load",
-    "link_compliance": "compliance of {joints} across the axis: bearings and links tilt under load",
-    "joint_stiffening": "stiffening of {joints}: the gear grows stiffer with load",
-    "backlash": "backlash in {joints}: the gear has play",
-    "hysteresis": "hysteresis of {joints}: friction stops the joint before its target, on the side of approach",
-    "transmission_error": "a transmission error of {joints}: the gear ratio varies with the angle",
-    "joint_offset": "a wrong zero of {joints}",
-    "link_geometry": "wrong geometry at {joints}: the axes differ from the stated link geometry",
-    "joint_coupling": "a coupling in the wrist: other motors also rotate {joints}",
-    "tool_offset": "a tool offset: tool or target differ from the stated position",
-    "base_offset": "a base offset: the robot differs from the stated position",
-    "thermal_growth": "thermal growth of the links before {joints}: they lengthen as the robot warms up",
-    "force_sensor": "an error of the stated forces: in their scale or their zero",
-}
-"""What an effect is, to those who do not know its name."""
 
 SETTLES = MARGIN**0.5
 """Standard deviations by which two explanations must differ for one to be named."""
@@ -142,7 +120,7 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
     if result.clear:
         yield from _missing(result, result.clear)
     for alternatives in result.verdict.alternatives:
-        one_of = " or ".join(candidate.label for candidate in alternatives)
+        one_of = " or ".join(in_words(candidate) for candidate in alternatives)
         yield f"These readings can not distinguish {one_of}: each explains them as well as the others."
     largest = max(result.diagnosis.disagreement, default=np.inf)
     if result.diagnosis.agreed:
@@ -205,7 +183,7 @@ def _unknown(result: Diagnosed) -> Iterator[str]:
             f" none of the {len(result.tried)} effects that were tried."
         )
     rejected = {candidate.key for candidate, _ in result.verdict.rejected}
-    near = [candidate.label for candidate in search.chosen if candidate.key not in rejected]
+    near = [in_words(candidate) for candidate in search.chosen if candidate.key not in rejected]
     if near:
         yield (
             f"The best explanation is {listed(near)}, but the residual would still be"
@@ -277,6 +255,10 @@ def noun(named: Named) -> str:
     last = named.candidate.up_to_joint
     whole = f"the joints up to {last}" if last else "the joints"
     return NOUNS[named.effect].format(joints=listed(named.joints) if named.joints else whole)
+
+
+def _sentence(words: str) -> str:
+    return words[:1].upper() + words[1:]
 
 
 def _parameters(named: Named) -> str:
@@ -354,14 +336,15 @@ def _nearest(several: Sequence[Named]) -> Iterator[str]:
     elif (alias.name, alias.joint) == (named.candidate.name, named.candidate.joint) and margin < MARGIN:
         yield f"Another form of it, {alias.label}, explains nearly as much (its likelihood gain is {margin:.0f} lower)."
     elif margin < MARGIN:
+        near = f"only {margin:.0f} lower" if margin >= 0.5 else "as large or larger"
         yield (
-            f"The next best explanation{of}, {alias.label}, has a likelihood gain only {margin:.0f} lower; the"
-            f" {named.effect} is named because the robot file describes one."
+            f"The likelihood gain of the next best explanation{of}, {alias.label}, is {near}; the {named.effect} is"
+            " named because the robot file describes one."
         )
     else:
         yield (
-            f"The next best explanation{of}, {alias.label}, fits clearly worse: its likelihood gain is {margin:.0f}"
-            f" lower, {MARGIN:.0f} are required."
+            f"The next best explanation{of}, {in_words(alias)}, fits clearly worse: its likelihood gain is"
+            f" {margin:.0f} lower, where {MARGIN:.0f} would do."
         )
 
 
@@ -399,7 +382,8 @@ def _more(result: Diagnosed, start: str, fit: str) -> Iterator[str]:
 
 def _rejected(result: Diagnosed) -> Iterator[str]:
     for candidate, why in result.verdict.rejected:
-        yield f"{candidate.label} would explain a part, but is not named: {why}{_course(result, candidate)}."
+        words = _sentence(in_words(candidate))
+        yield f"{words} would explain a part, but is not named: {why}{_course(result, candidate)}."
 
 
 def _course(result: Diagnosed, candidate: Candidate) -> str:

@@ -31,6 +31,14 @@ from postproc.identification.registration import registered
 FRESH = 20
 """Poses that were not measured."""
 
+LITTLE = 0.5
+"""Standard deviations of a coordinate: where less shows at the fresh poses, there is nothing to predict."""
+
+WORST = 3
+"""Cases that are printed."""
+
+NEW_OVER_OLD = "fresh poses, RMS new over old"
+
 LARGE = 1e-3
 """[m, rad] from which on a shift or zero that is not there would send a mechanic to work."""
 
@@ -44,7 +52,7 @@ def loss_of(answer: dict, accept, needed) -> int:
     if false or any(not fits(name, accept) for name in names):
         return 3
     if not needed:
-        return 0 if answer["verdict"] == "nothing_missing" else 2
+        return 0 if answer["verdict"] == "nothing_missing" or (names and not sets) else 2
     if any(fits(name, needed) for name in names):
         return 0
     return 1 if any(fits(pair, needed) for one in sets for pair in one) else 2
@@ -123,6 +131,11 @@ def judge(trial: Trial, answer: dict, new: Path) -> dict[str, bool | float]:
         before = fresh_gap(trial, model_of(trial.files["robot.yaml"]))
         after = fresh_gap(trial, found)
         held["gap closed"] = 1.0 - after / before if before > 1e-9 else 1.0
+        solved = (
+            held.get("named or in the set", word == "nothing_missing") and not held["a name that is wrong"]
+        )
+        if solved and before > LITTLE * trial.sigma:
+            held[NEW_OVER_OLD] = after / before
         stated = answer.get("largest_disagreement_mm")
         if trial.row == "twin" and stated is not None:
             held["stated disagreement is true"] = after * 1e3 <= stated + 3 * trial.sigma * 1e3
@@ -165,6 +178,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--verbose", action="store_true", help="a line for every run")
     given = parser.parse_args(argv)
     diagnosing = Diagnosing()
+    ratios: list[tuple[float, str]] = []
     for row in given.rows.split(","):
         counts: dict[str, list] = defaultdict(list)
         words: dict[str, int] = defaultdict(int)
@@ -174,6 +188,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             held, answer = run(trial, diagnosing)
             words[answer["verdict"]] += 1
             seconds.append(answer["seconds"])
+            if NEW_OVER_OLD in held:
+                ratios.append((float(held[NEW_OVER_OLD]), f"{row} {number}"))
             for key, value in held.items():
                 counts[key].append(value)
             if given.verbose:
@@ -193,14 +209,31 @@ def main(argv: Sequence[str] | None = None) -> int:
                       flush=True)  # fmt: skip
         print(f"{row}: " + ", ".join(f"{n} {word}" for word, n in sorted(words.items())))
         for key, values in counts.items():
-            if any(isinstance(v, float) for v in values):
+            if key == NEW_OVER_OLD:
+                print(
+                    f"  {key:36} {np.median(values):.3f} in the median, {max(values):.3f} at worst, {len(values)}"
+                )
+            elif any(isinstance(v, float) for v in values):
                 middle, mean = 100 * np.median(values), 100 * np.mean(values)
                 print(f"  {key:36} {middle:.1f} % in the median, {mean:.1f} in the mean of {len(values)}")
             else:
                 print(f"  {key:36} {share(values)}")
         print(f"  seconds {np.median(seconds):.1f} in the median, {max(seconds):.1f} at most", flush=True)
     diagnosing.close()
+    print(of_all(ratios))
     return 0
+
+
+def of_all(ratios: Sequence[tuple[float, str]]) -> str:
+    """What the robot files that were written leave of the gap at poses that were not measured."""
+    if not ratios:
+        return f"{NEW_OVER_OLD}: no case"
+    values = [ratio for ratio, _ in ratios]
+    worst = ", ".join(f"{name} {ratio:.2f}" for ratio, name in sorted(ratios, reverse=True)[:WORST])
+    return (
+        f"{NEW_OVER_OLD}, {len(values)} cases that were solved: {np.median(values):.3f} in the median,"
+        f" {sum(ratio <= 0.5 for ratio in values)} at most 0.5; worst {worst}"
+    )
 
 
 if __name__ == "__main__":

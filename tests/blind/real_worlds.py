@@ -156,8 +156,13 @@ def scale(number: int, seed: int) -> Trial:
                  sigma, words, {"data.csv": measurements_csv(unsaid(readings))})  # fmt: skip
 
 
+SHOWN, SOME = 2.0, 5
+"""Standard deviations of a coordinate, root mean square, by which a gap shows, and poses at which it does clearly."""
+
+
 def approach(number: int, seed: int) -> Trial:
-    """Backlash (under load) or hysteresis, with senses of approach in the file and without."""
+    """Backlash (under load) or hysteresis, with senses of approach in the file and without; so large that it shows at
+    some poses (a gap that no load changes sides of cannot)."""
     rng = rng_of("approach", number, seed)
     name = ("backlash", "hysteresis")[number % 2]
     told = number // 2 % 2 == 0
@@ -165,13 +170,20 @@ def approach(number: int, seed: int) -> Trial:
     count = int(rng.choice([30, 45, 60]))
     design = drawn(model_of(raw), count, name == "backlash", rng, planned=False, places=True)
     design = replace(design, told=told, time=None, temperature=None)
-    h = hidden.drawn(name, rng)
-    size = float(rng.uniform(1.0, 4.0))
-    scene = h.into(as_filed(True), size)
     if not told:  # the file's order is not that of the approach either
         design = replace(design, senses=rng.choice([-1.0, 1.0], design.q.shape))
+    sigma, size, without = (
+        measured.scatter(design, model_of(raw)),
+        0.0,
+        measured.observed(as_filed(True), design),
+    )
+    for more in range(20):
+        h, size = hidden.drawn(name, rng), float(rng.uniform(1.0, 4.0)) * 1.1**more
+        scene = h.into(as_filed(True), size)
+        away = (measured.observed(scene, design) - without).reshape(len(design.q), -1)
+        if np.sqrt(np.mean(away**2)) > SHOWN * sigma and (abs(away).max(axis=1) > 3 * sigma).sum() >= SOME:
+            break
     moved = jitter(design, rng)
-    sigma = measured.scatter(design, model_of(raw))
     value = measured.observed(scene, design, moved) + measured.noise(design, rng)
     own = frozenset({(name, h.joint)})
     words = f"{name} {h.joint} x{size:.2f}, {'DIR' if told else 'no DIR'}, {count} poses"
