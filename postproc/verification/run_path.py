@@ -68,7 +68,7 @@ class RunPath:
         return tangents
 
     def pose_and_tangent(self, rows: Ints, share: Floats) -> tuple[Poses, Floats]:
-        """As ``at`` and ``tangent``."""
+        """Poses (K) and tangents (K, 3) at the shares (K,) of the motions ``rows`` (K,), as ``at`` and ``tangent``."""
         poses, tangents = self._programmed(rows, share), self._programmed_tangent(rows, share)
         for some, vertex, u in self._near(rows, share):
             before, after = self._both(vertex, u)

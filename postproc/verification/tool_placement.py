@@ -20,6 +20,7 @@ So a corner holds the tool that is nearest to it, and a force that jumps has eve
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -27,6 +28,7 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import each_block
 from postproc.base.geometry import Poses, lengths, turn_between
+from postproc.base.units import MM
 from postproc.compensation.mirror import Prediction
 from postproc.compensation.problem import CompensationProblem
 from postproc.verification.path_grid import LEAST_NODES, SPOT, PathGrid
@@ -42,6 +44,10 @@ STEPS, HALVINGS = 10, 60
 SAME_GUESS = 1e-6
 """Parts of an interval by which two first places of a command differ by rounding alone."""
 
+LEAP, LEAST_LEAP, BESIDE = 4.0, 0.05 * MM, 24
+"""By how many times the step of the command, and how much [m], a place leaps at least; so many commands before and
+after it are tried on its other side."""
+
 FLAT = 0.02
 """Least slope of h that a step is taken with, in parts of a path that the force does not move."""
 
@@ -51,7 +57,7 @@ class PlacedTool:
     """S commands of a program.  row, share (S,): place on the original; arc (S,) [m]: the same along its stretch; error
     (S, 3) [m]: tool minus the wanted path there, robot base axes; turn (S,) [rad]: by how much the tool is turned
     against it, as far as that shows and the text can state it; force (S,) [N]; settled (S,): place and force agree;
-    tool, command (S, 3) [m]; guess (S,): the interval and the part of it from which the place was found."""
+    tool, command (S, 3) [m]; place (S,): the interval and the part of it, guess (S,) those from which it was found."""
 
     row: Ints
     share: Floats
@@ -63,13 +69,14 @@ class PlacedTool:
     tool: Floats
     command: Floats
     guess: Floats
+    place: Floats
 
     @staticmethod
     def empty(count: int) -> PlacedTool:
         row, settled = np.zeros(count, np.int64), np.zeros(count, bool)
-        share, arc, turn, force, guess = np.full((5, count), np.nan)
+        share, arc, turn, force, guess, place = np.full((6, count), np.nan)
         error, tool, command = np.full((3, count, 3), np.nan)
-        return PlacedTool(row, share, arc, error, turn, force, settled, tool, command, guess)
+        return PlacedTool(row, share, arc, error, turn, force, settled, tool, command, guess, place)
 
     def at(self, numbers: Ints) -> PlacedTool:
         """Those of ``numbers`` (K,)."""
@@ -107,21 +114,47 @@ def place_tool(
     todo = np.flatnonzero(~placed.settled | ~(np.abs(guess - placed.guess) <= SAME_GUESS))
     low, high = grid.first[stretch], grid.first[stretch + 1] - 2
 
-    def solve_block(block: slice) -> None:
-        some = todo[block]
+    def solved(some: Ints, interval: Ints, part: Floats) -> PlacedTool:
         there = path.at(motion[some], share[some])
         here = _Solution(grid, path.task, motion[some], share[some], there, low[some], high[some])
-        here.find(interval[some], part[some])
+        here.find(interval, part)
         here.turn_on_the_spot()
-        row, place = grid.place(here.interval, here.part)
-        wanted = grid.path.at(row, place).rotation
+        row, share_there = grid.place(here.interval, here.part)
+        wanted = grid.path.at(row, share_there).rotation
         turn = lengths(judged(grid.original, row, wanted, here.turn))
         arc = grid.along(here.interval, here.part)
-        own = (row, place, arc, here.error, turn, here.force, here.settled)
-        placed.put(some, PlacedTool(*own, here.tool, there.position, guess[some]))
+        place = here.interval + here.part
+        own = (row, share_there, arc, here.error, turn, here.force, here.settled)
+        return PlacedTool(*own, here.tool, there.position, guess[some], place)
+
+    def solve_block(block: slice) -> None:
+        some = todo[block]
+        placed.put(some, solved(some, interval[some], part[some]))
 
     each_block(solve_block, len(todo))
+    for some, place in _beside_leaps(placed, stretch):
+        start = np.minimum(place.astype(np.int64), high[some])
+        other = solved(some, start, place - start)
+        size, new = lengths(placed.error[some]), lengths(other.error)
+        nearer = np.flatnonzero(other.settled & (~placed.settled[some] | (new < size - RESIDUAL)))
+        placed.put(some[nearer], other.at(nearer))
     return placed
+
+
+def _beside_leaps(placed: PlacedTool, stretch: Ints) -> Iterator[tuple[Ints, Floats]]:
+    """Commands (K,) before and after those at which the place leaps on, and the place (K,) on the other side of the
+    leap: of two places at which the path is square to the tool, the nearer one counts."""
+    step = lengths(np.diff(placed.command, axis=0))
+    leaps = np.flatnonzero((np.diff(placed.arc) > LEAP * step + LEAST_LEAP) & (stretch[1:] == stretch[:-1]))
+    for side in (0, 1):
+        away = np.arange(BESIDE)
+        beside = leaps[:, None] + (1 + away if side else -away)
+        at = np.clip(beside, 0, len(stretch) - 1)
+        other = np.broadcast_to(placed.place[leaps + (1 - side)][:, None], at.shape)
+        same = (beside == at) & (stretch[at] == stretch[leaps][:, None])
+        some, first = np.unique(at[same], return_index=True)
+        if len(some):
+            yield some, other[same][first]
 
 
 def judged(original: CompensationProblem, rows: Ints, rotation: Floats, turn: Floats) -> Floats:
