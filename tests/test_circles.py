@@ -142,6 +142,17 @@ def straight(steps=60):
     ]
 
 
+def corrections_of(source, output):
+    """(59,) [mm] by how much the motions of ``straight`` are moved in Y, from the last one on."""
+    first, second = (
+        detect(path, path.read_bytes()).read((Document(path, path.read_bytes()),)).toolpath
+        for path in (source, output)
+    )
+    back = np.arange(1, 60)  # the last motion but one is the first
+    rows = [len(path) - 1 - back for path in (second, first)]
+    return 1000 * (second.position[rows[0]] - first.position[rows[1]])[:, 1]
+
+
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("cell", [{}, ABSOLUTE], ids=["process", "absolute"])
 @pytest.mark.parametrize("effect", LETTERS)
@@ -150,12 +161,7 @@ def test_rounding_of_a_straight_line_changes_no_side(compensate, job, effect, ce
     source = job.write(straight())
     done = compensate(source, "--force", "-q")
     assert done.code in (0, 3), done.err
-    first, second = (
-        detect(path, path.read_bytes()).read((Document(path, path.read_bytes()),)).toolpath
-        for path in (source, job.output)
-    )
-    cut = first.feed.shape[0] - 1 - np.arange(1, 60)  # the last motions but one
-    moved = 1000 * (second.position[len(second) - 1 - np.arange(1, 60)] - first.position[cut])[:, 1]
+    moved = corrections_of(source, job.output)
     assert np.abs(moved).min() > 0.1  # half the gap at 1.6 m
     assert len(set(np.sign(moved))) == 1
     assert np.abs(np.diff(moved)).max() < 0.003

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from judge.cases import CELL, Case, krl, pose, run
 from judge.drawn import defects, drawn
-from judge.force import STRETCHED
 
 SEEDS = [3, 12, 14, 17, 20, 24, 28, 31, 34, 36, 42]
 
@@ -16,7 +15,7 @@ SEEDS = [3, 12, 14, 17, 20, 24, 28, 31, 34, 36, 42]
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_nothing_is_wrong_in_silence(tmp_path: Path, seed: int) -> None:
-    outcome = run(drawn(seed), tmp_path, verify=True, rule=STRETCHED)
+    outcome = run(drawn(seed), tmp_path, verify=True)
     assert outcome.verdict is not None, outcome.message
     assert defects(outcome) == []
 
@@ -28,7 +27,7 @@ def test_an_arc_between_stops_is_not_cut_short(tmp_path: Path) -> None:
         ";FORCE 40 -30 -20 @feed", f"CIRC {pose(64, 4, 0)},{pose(60, 8, 0)}", f"LIN {pose(0, 8, 0)}", ";FORCE OFF",
         f"LIN {pose(0, 8, 50)}", head=("$APO.CDIS=3",), cell=CELL + "max_growth: 20\n",
     )  # fmt: skip
-    outcome = run(Case("arc between stops", build), tmp_path, rule=STRETCHED)
+    outcome = run(Case("arc between stops", build), tmp_path)
     assert outcome.verdict is not None
     assert outcome.verdict.motions[1] > outcome.verdict.motions[0]
     assert (outcome.exit, outcome.failed) == (0, [])

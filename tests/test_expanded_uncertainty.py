@@ -105,11 +105,11 @@ def job(model, count=10, process=True, wrench=None, gain=1.0, seed=5):
     )
 
 
-def drawn(task, command, names, root, force=0.0):
+def drawn(task, command, names, root, force=0.0, seed=11):
     """(DRAWS, N, 3) [m] errors of robots of which the parameters ``names`` were drawn, once with the controllers sent
     to the wanted poses and once to ``command``.  ``root``: a root of the parameters' covariance; ``force``: standard
     deviation of the force's scale."""
-    rng = np.random.default_rng(11)
+    rng = np.random.default_rng(seed)
     place = {}
     for index, term in enumerate(task.model.terms):
         for name, value in term.values.items():

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from postproc.base.units import MM
-from postproc.identification.campaign import Campaign
+
+if TYPE_CHECKING:
+    from postproc.identification.campaign import Campaign
 
 UNITS = {
     "m": ("mm", MM),

@@ -68,12 +68,11 @@ class PathGrid:
         v, tangent, goals = (np.empty((len(row), 3)) for _ in range(3))
 
         def fill(part: slice) -> None:
-            there = path.at(row[part], share[part])
+            there, tangent[part] = path.pose_and_tangent(row[part], share[part])
             wrench = original.force.along(row[part], share[part])
             real = original.simulated(row[part], there, wrench, share=share[part])
             goal = original.goal(row[part], there, share[part]).position
             goals[part], v[part] = goal, goal - np.nan_to_num(real.pose.position - there.position)
-            tangent[part] = path.tangent(row[part], share[part])
 
         each_block(fill, len(row))
         gap = np.append(row[1:] != row[:-1], True)[: len(row)]
@@ -103,9 +102,8 @@ class PathGrid:
     def goal(self, interval: Ints, part: Floats) -> tuple[Poses, Floats, Floats]:
         """Goal poses (S), tangents (S, 3) and wrenches (S, 6) at the parts (S,) of intervals."""
         row, share = self.place(interval, part)
-        wanted = self.path.at(row, share)
-        goal = self.original.goal(row, wanted, share)
-        tangent, wrench = self.path.tangent(row, share), self.original.force.along(row, share)
+        wanted, tangent = self.path.pose_and_tangent(row, share)
+        goal, wrench = self.original.goal(row, wanted, share), self.original.force.along(row, share)
         over = np.flatnonzero(self.gap[interval])
         if len(over):
             other, start = self.row[interval[over] + 1], np.zeros(len(over))

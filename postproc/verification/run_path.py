@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from postproc.base.geometry import Poses, lengths, product, rotation_from_vector
 from postproc.compensation.problem import CompensationProblem
 
 _NO_LENGTH = 1e-9
+
+_NO_TURN = 1e-13
+"""[rad] Orientations that differ by less differ by rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,28 +54,78 @@ class RunPath:
 
     def at(self, rows: Ints, share: Floats) -> Poses:
         """Poses (K) at the shares (K,) of the motions ``rows`` (K,)."""
-        poses = self.task.desired_path.at(rows, share)
+        poses = self._programmed(rows, share)
         for some, vertex, u in self._near(rows, share):
-            before, after = self._both(vertex, u)
-            weight = u[:, None]
-            over = turn_between(before.rotation, after.rotation)
-            poses.rotation[some] = product(rotation_from_vector(weight * over), before.rotation)
-            poses.position[some] = (1 - weight) * before.position + weight * after.position
+            poses.put(some, _blended(*self._both(vertex, u), u))
         return poses
 
     def tangent(self, rows: Ints, share: Floats) -> Floats:
         """(K, 3) unit vectors along the path at the shares (K,) of ``rows`` (K,); zero where a motion only turns the
         tool."""
-        desired_path, length = self.task.desired_path, self.task.desired_path.length
-        tangents = desired_path.tangent(rows, share)
+        tangents = self._programmed_tangent(rows, share)
+        for some, vertex, u in self._near(rows, share):
+            tangents[some] = self._tangent_between(vertex, u, *self._both(vertex, u))
+        return tangents
+
+    def pose_and_tangent(self, rows: Ints, share: Floats) -> tuple[Poses, Floats]:
+        """Poses (K) and tangents (K, 3) at the shares (K,) of the motions ``rows`` (K,), as ``at`` and ``tangent``."""
+        poses, tangents = self._programmed(rows, share), self._programmed_tangent(rows, share)
         for some, vertex, u in self._near(rows, share):
             before, after = self._both(vertex, u)
-            reach, weight = self.reach[vertex], u[:, None]
-            one = desired_path.tangent(vertex - 1, 1 - reach * (1 - u) / length[vertex - 1])
-            two = desired_path.tangent(vertex, reach * u / length[vertex])
-            along = (after.position - before.position) / reach[:, None] + (1 - weight) * one + weight * two
-            tangents[some] = along / np.maximum(lengths(along), _NO_LENGTH)[:, None]
+            poses.put(some, _blended(before, after, u))
+            tangents[some] = self._tangent_between(vertex, u, before, after)
+        return poses, tangents
+
+    @cached_property
+    def _even(self) -> Bools:
+        """(N,) straight motions that turn the tool evenly about one axis, if at all."""
+        path = self.task.desired_path
+        even = np.isfinite(path.angle) & ~path.arc
+        even[path.half_turns.rows] = False
+        return even
+
+    def _programmed(self, rows: Ints, share: Floats) -> Poses:
+        """As ``at``, with all vertices as they are programmed.  What is the same along a motion is asked for once where
+        several of the K places in a row are on it."""
+        path = self.task.desired_path
+        poses = Poses(np.empty((len(rows), 3, 3)), np.empty((len(rows), 3)))
+        even = self._even[rows]
+        for some, is_even in ((np.flatnonzero(even), True), (np.flatnonzero(~even), False)):
+            if not len(some):
+                continue
+            if not is_even:
+                poses.put(some, path.at(rows[some], share[some]))
+                continue
+            motions, own = _runs(rows[some])
+            start, end = path.start[motions], path.end[motions]
+            turn = turn_between(start.rotation, end.rotation)
+            part = share[some][:, None]
+            poses.position[some] = start.position[own] + part * (end.position - start.position)[own]
+            poses.rotation[some] = start.rotation[own]
+            turns = np.flatnonzero((lengths(turn) > _NO_TURN)[own])
+            if len(turns):
+                by = rotation_from_vector(part[turns] * turn[own[turns]])
+                at = some[turns]
+                poses.rotation[at] = product(by, poses.rotation[at])
+        return poses
+
+    def _programmed_tangent(self, rows: Ints, share: Floats) -> Floats:
+        """As ``tangent``, with all vertices as they are programmed."""
+        desired_path = self.task.desired_path
+        motions, own = _runs(rows)
+        tangents = desired_path.tangent(motions, np.zeros(len(motions)))[own]
+        arcs = np.flatnonzero(desired_path.arc[rows])
+        if len(arcs):
+            tangents[arcs] = desired_path.tangent(rows[arcs], share[arcs])
         return tangents
+
+    def _tangent_between(self, vertex: Ints, u: Floats, before: Poses, after: Poses) -> Floats:
+        """(K, 3) on the parabolas at the vertices where motions (K,) start, ``before`` and ``after`` being A and B."""
+        length, reach, weight = self.task.desired_path.length, self.reach[vertex], u[:, None]
+        one = self._programmed_tangent(vertex - 1, 1 - reach * (1 - u) / length[vertex - 1])
+        two = self._programmed_tangent(vertex, reach * u / length[vertex])
+        along = (after.position - before.position) / reach[:, None] + (1 - weight) * one + weight * two
+        return np.asarray(along / np.maximum(lengths(along), _NO_LENGTH)[:, None])
 
     def shares(self, rows: Ints, parts: Ints, halves: Ints, opens: Bools) -> tuple[Ints, Floats]:
         """Places along the motions ``rows`` (R,): their numbers among these (S,), ascending, and shares (S,).
@@ -79,14 +133,14 @@ class RunPath:
         The ends of ``parts`` (R,) even parts of each motion, and of ``halves`` (R,) even parts of the halves of the
         parabolas on it; of its start nothing, as it is the end of another, but where ``opens`` (R,).
         """
-        number, share = _even(parts)
+        number, share = _even_shares(parts)
         first = np.flatnonzero(opens)
         numbers, shares = [number, first], [share, np.zeros(len(first))]
         length = self.task.desired_path.length[rows]
         following = np.where(rows + 1 < len(self.reach), rows + 1, 0)
         for at_end, reach in ((False, self.reach[rows]), (True, self.reach[following])):
             near = np.flatnonzero(reach > 0)
-            own, part = _even(halves[near])
+            own, part = _even_shares(halves[near])
             part = part * (reach[near] / length[near])[own]
             numbers.append(near[own])
             shares.append(1 - part if at_end else part)
@@ -120,11 +174,27 @@ class RunPath:
     def _both(self, vertex: Ints, u: Floats) -> tuple[Poses, Poses]:
         """A and B at the vertices where motions (K,) start."""
         desired_path, reach = self.task.desired_path, self.reach[vertex]
-        before = desired_path.at(vertex - 1, 1 - reach * (1 - u) / desired_path.length[vertex - 1])
-        return before, desired_path.at(vertex, reach * u / desired_path.length[vertex])
+        before = self._programmed(vertex - 1, 1 - reach * (1 - u) / desired_path.length[vertex - 1])
+        return before, self._programmed(vertex, reach * u / desired_path.length[vertex])
 
 
-def _even(parts: Ints) -> tuple[Ints, Floats]:
+def _blended(before: Poses, after: Poses, u: Floats) -> Poses:
+    """The poses (K) on parabolas at u (K,), between A and B."""
+    weight, rotation = u[:, None], before.rotation.copy()
+    turn = turn_between(before.rotation, after.rotation)
+    turns = np.flatnonzero(lengths(turn) > _NO_TURN)
+    if len(turns):
+        rotation[turns] = product(rotation_from_vector(weight[turns] * turn[turns]), rotation[turns])
+    return Poses(rotation, (1 - weight) * before.position + weight * after.position)
+
+
+def _runs(rows: Ints) -> tuple[Ints, Ints]:
+    """The motions (R,) of ``rows`` (K,) without those that are as the one before, and which of them each is (K,)."""
+    other = np.append(True, rows[1:] != rows[:-1])[: len(rows)]
+    return rows[other], np.cumsum(other) - 1
+
+
+def _even_shares(parts: Ints) -> tuple[Ints, Floats]:
     """Numbers of owners, and the shares at which even ``parts`` (R,) of them end."""
     number = np.repeat(np.arange(len(parts)), parts)
     share = (np.arange(len(number)) - np.repeat(sums(parts)[:-1], parts) + 1) / np.repeat(parts, parts)

@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints, sums
-from postproc.base.batches import each_block
 from postproc.base.geometry import Poses, lengths, turn_between
 from postproc.base.units import MM
 from postproc.compensation.problem import CompensationProblem
@@ -233,7 +232,7 @@ class Simulator:
             if not len(rows) or parts.sum() > MOST or not samples.place.settled.all():
                 break
             often = _often(samples, rows)
-            finer = self._sampled(run, path, stretch, rows, parts * often, halves * often)
+            finer = self._sampled(run, path, stretch, rows, parts * often, halves * often, samples)
             old, new = samples.distance, finer.distance
             change = abs(float(new.max() - old.max()))
             mean = abs(finer.rms - samples.rms)
@@ -252,15 +251,17 @@ class Simulator:
         rows: Ints,
         parts: Ints,
         halves: Ints,
+        coarser: PathSamples | None = None,
     ) -> PathSamples:
         """Samples at the ends of ``parts`` (R,) even parts of the motions ``rows`` (R,), of ``halves`` (R,) even parts
-        of the halves of parabolas on them, and where each stretch starts."""
+        of the halves of parabolas on them, and where each stretch starts; those of ``coarser`` are not solved again."""
         opens = np.append(True, stretch[1:] != stretch[:-1])[: len(rows)]
         closes = np.append(stretch[1:] != stretch[:-1], True)[: len(rows)]
         number, share = path.shares(rows, parts, halves, opens)
         end = share == 1.0
         motion, where = rows[number], stretch[number]
-        place = place_tool(self.grid, path, where, motion, share)
+        known = None if coarser is None else _among(coarser, rows, number, share)
+        place = place_tool(self.grid, path, where, (motion, share), known)
         before = np.append(0.0, np.where(number[1:] == number[:-1], share[:-1], 0.0))[: len(share)]
         distance = (share - before) * run.desired_path.length[motion]
         return PathSamples(
@@ -273,14 +274,7 @@ class Simulator:
         grid, place = self.grid, samples.place
         if not len(samples.motion) or not place.settled.all():
             return float("nan") if len(samples.motion) else 0.0
-        there = place.error.copy()
-
-        def reached(part: slice) -> None:
-            row = place.row[part]
-            wanted = self.path.at(row, place.share[part])
-            there[part] += self.original.goal(row, wanted, place.share[part]).position
-
-        each_block(reached, len(there))
+        there = place.tool
         far = 2 * float(grid.arc.max()) + 1.0
         passed = np.maximum.accumulate(samples.stretch * far + place.arc)
         some = grid.gap | np.append(True, grid.gap[:-1])
@@ -309,6 +303,15 @@ def _rows(start: Ints, stop: Ints) -> Ints:
     """The rows ``start`` to before ``stop`` (K,), one range after another."""
     count = stop - start
     return np.repeat(start - sums(count)[:-1], count) + np.arange(count.sum())
+
+
+def _among(coarser: PathSamples, rows: Ints, number: Ints, share: Floats) -> tuple[PlacedTool, Ints]:
+    """Places of ``coarser``, and which of the samples at the shares (S,) of the motions ``number`` (S,) among ``rows``
+    (R,) they are; parts of parts end at the very same shares."""
+    old = np.searchsorted(rows, coarser.motion)
+    at = np.minimum(np.searchsorted(2.0 * number + share, 2.0 * old + coarser.share), len(share) - 1)
+    same = np.flatnonzero((number[at] == old) & (share[at] == coarser.share))
+    return coarser.place.at(same), at[same]
 
 
 def _often(samples: PathSamples, rows: Ints) -> Ints:

@@ -12,7 +12,6 @@ from postproc.base.arrays import Floats, Ints
 from postproc.base.findings import Finding, Refusal
 from postproc.base.units import DEG, MM
 from postproc.output.atomic_write import write_atomically
-from postproc.report.page import beside
 from postproc.report.report import Spread, exit_code, in_order_of_place, json_bytes
 from postproc.report.verified import PathComparison, Verified, WorstError
 from postproc.verification.differences import Difference, PathManner, in_air, missing, on_cuts
@@ -79,7 +78,8 @@ def verify(
     names = {"original": request.program, "compensated": compensated, "result (JSON)": request.json}
     files = {} if request.json is None else {request.json: json_bytes(done)}
     if page is not None:
-        from postproc.report.page_checks import verified_page  # takes its time to load
+        from postproc.report.page import beside  # these take their time to load
+        from postproc.report.page_checks import verified_page
 
         files[page] = verified_page(done, beside(page, names))
     for inputs in (ready.inputs, other.inputs):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from .cases import CASES, DEG, PACKAGE, Outcome, run
 from .drawn import defects, drawn
-from .force import RULE, STRETCHED
+from .force import RULE
 from .motion import MM
 
 HEADER = (
@@ -59,9 +59,7 @@ def main(words: list[str]) -> int:
         if words and not any(word in case.name for word in words):
             continue
         with tempfile.TemporaryDirectory() as folder:
-            outcome = run(
-                case, Path(folder), verify=True, rule=rule or (STRETCHED if count else RULE), package=package
-            )
+            outcome = run(case, Path(folder), verify=True, rule=rule or RULE, package=package)
         wrong = defects(outcome) if count else outcome.failed
         failed += bool(wrong)
         print(row(outcome) + (f"  DEFECT: {'; '.join(wrong)}" if count and wrong else ""), flush=True)

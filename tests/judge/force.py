@@ -11,8 +11,14 @@ changes linearly over a ramp of total length r, half of it on each side (at most
 mean of both sides at the vertex.  A cut begins and ends with steps.
 
 That is the rule CENTRED.  By the rule AFTER the motion before a vertex keeps its force up to it, and the change goes
-over along r behind it; by the rule STRETCHED as well, along as much more as keeps the deflection from growing along the
-feed by more than 0.9 mm a millimetre: the tool would not be back on its path otherwise."""
+over along r behind it.
+
+By the rule STRETCHED, which the package states of its output and which is judged by, along r = max(ramp, d / 0.9)
+behind it: d is by how much the target that brings the tool to the vertex goes back along the feed there, from the force
+that ends to the force that begins.  A ramp of the stated length alone would ask for a program that goes back into the
+material, and for a tool that jumps: with d > r the tool is at two places of the path with the force of either.  So what
+is written can only be right for a force that changes over r, and is judged under that one.  At 0.9 the place answers
+ten times to what the ramp is off (1 / (1 - 0.9)): d has to be exact, and is solved for."""
 
 from __future__ import annotations
 
@@ -26,7 +32,7 @@ SMOOTH = np.radians(30.0)
 JUMP, JUMP_OF_LARGEST = 2 * np.sin(SMOOTH / 2), 0.05
 NO_DIRECTION = np.radians(1.0)
 CENTRED, AFTER, STRETCHED = "centred", "after", "stretched"
-RULE = AFTER
+RULE = STRETCHED
 """The rule that the package has."""
 STEEPEST = 0.9
 
@@ -42,10 +48,10 @@ class Field:
         ramp: float,
         largest: float,
         rule: str = CENTRED,
-        deflect: Callable[[int, np.ndarray], np.ndarray] | None = None,
+        correct: Callable[[int, np.ndarray], np.ndarray] | None = None,
     ) -> None:
-        """``low``, ``high``: first and last motion; largest [N]: of the program; deflect: the deflection (3,) [m]
-        where a motion begins under a wrench (6,), for the rule STRETCHED."""
+        """``low``, ``high``: first and last motion; largest [N]: of the program; correct: by how much (3,) [m]
+        a target is moved where a motion begins under a wrench (6,), for the rule STRETCHED."""
         self.path, self.low, self.high = path, low, high
         self.rows = np.arange(low, high + 1)
         motions = path.motions[low : high + 1]
@@ -64,8 +70,8 @@ class Field:
         if rule != CENTRED:
             for k in step:
                 reach, change = ramp, begin[k + 1] - end[k]
-                if rule == STRETCHED and deflect is not None:
-                    moved = deflect(low + k + 1, begin[k + 1]) - deflect(low + k + 1, end[k])
+                if rule == STRETCHED and correct is not None:
+                    moved = correct(low + k + 1, end[k]) - correct(low + k + 1, begin[k + 1])
                     feed = path.tangent(np.array([low + k + 1]), np.zeros(1))[0]
                     reach = max(ramp, moved @ feed / STEEPEST)
                 self.after.append((path.start[low + k + 1], reach, change))

@@ -14,24 +14,22 @@ from pathlib import Path as File
 import numpy as np
 
 from .cell import Cell
-from .force import CENTRED, STRETCHED, Field
+from .force import RULE, STRETCHED, Field
 from .motion import MM, Motion
 from .path import Path
+from .placing import BETWEEN, Tools, find_places, settle_places
 from .reader import read
-from .robot import Robot, check_on_mujoco, rotation_vectors
+from .robot import Robot, check_on_mujoco, rotation_vectors, rotations
 
 STEP = 1.0 * MM
 SAGITTA = 2e-7
 """[m] How far a curve may be from the chords between its samples."""
-GRID, POINTS = 0.02 * MM, 50_000
-"""Steps in which places are looked for, larger where a cut would have more of them."""
-NEARBY = 5.0 * MM
-"""A tool this far from the path counts, along a stretch of it, as much as a jump along the path of the same length."""
-MARCHES, ROUNDS, BESIDE = 3, 8, 6
-REACHES, CLOSE = (1.1, 3.3, 10.0, 30.0, 100.0), (0.5, 3.0, 10.0)
-"""Steps of the grid to either side in which a place is looked for again, one after the other."""
-SETTLED = 1e-10
+WORST, PARTS, ROUNDS = 6, 16, 2
+"""Places with the largest errors beside which is sampled again, in so many parts of the way to the next samples, and
+how often."""
 BACKWARDS = 2e-6
+CORRECTIONS = 8
+"""Rounds in which a target is corrected: each leaves less than a hundredth of what was off."""
 MATCH = 1e-9
 """[m] to which every judged state that MuJoCo is asked for again has to agree."""
 
@@ -107,7 +105,7 @@ def judge(
     cell_file: File,
     ramp: float | None = None,
     step: float = STEP,
-    rule: str = CENTRED,
+    rule: str = RULE,
 ) -> Verdict:
     """Run ``original`` and ``output`` from their bytes; ``ramp`` [m] where the cell states none; rule: of the force."""
     cell = Cell.load(cell_file, ramp)
@@ -118,25 +116,35 @@ def judge(
     if len(cuts) != len(others):
         raise NotComparable(f"{len(cuts)} cuts before, {len(others)} after")
     largest = max((np.linalg.norm(m.force[0][:3]) for m in first.motions if not m.air), default=0.0)
-    deflect = _deflection(first) if rule == STRETCHED else None
-    fields = [Field(first, low, high, cell.ramp, largest, rule, deflect) for low, high in cuts]
+    correct = _correction(first) if rule == STRETCHED else None
+    fields = [Field(first, low, high, cell.ramp, largest, rule, correct) for low, high in cuts]
     before = _run(first, cuts, first, cuts, fields, step)
     after = _run(first, cuts, second, others, fields, step)
     return Verdict(before, after, cell, len(cuts), (len(first.motions), len(second.motions)))
 
 
-def _deflection(path: Path) -> Callable[[int, np.ndarray], np.ndarray]:
-    """How far (3,) [m] the tool gives way where a motion begins, under a wrench (6,) in base axes."""
+def _correction(path: Path) -> Callable[[int, np.ndarray], np.ndarray]:
+    """By how much (3,) [m] the target has to be moved where a motion begins, so that the tool is there under a wrench
+    (6,) in base axes; as far as the text can state it, the tool's orientation is kept too."""
     labels, joints = path.joints_at_nodes()
 
-    def deflect(i: int, wrench: np.ndarray) -> np.ndarray:
-        q = np.array([[np.interp(path.start[i], labels, joints[:, j]) for j in range(6)]])
-        turns, _ = path.frames(np.array([i]), path.outside[i, :1])
+    def correct(i: int, wrench: np.ndarray) -> np.ndarray:
+        m = path.motions[i]
+        guess = np.array([[np.interp(path.start[i], labels, joints[:, j]) for j in range(6)]])
+        at, outside = np.array([i]), path.outside[i, :1]
+        wanted, turned = path.in_robot(at, path.place[i, :1], path.turned[i, :1], outside)
+        turns, _ = path.frames(at, outside)
         own = (turns[0] @ wrench.reshape(2, 3).T).T.reshape(1, 6)
-        tool = path.motions[i].tool
-        return turns[0].T @ (path.robot.rest(q, own, tool)[0][0] - path.robot.chain(q, tool)[0][0])
+        place, rotation, spindle = wanted.copy(), turned.copy(), turned[0] @ m.spindle
+        for _ in range(CORRECTIONS):
+            q = path.robot.settle(place, rotation, m.tool, guess)
+            real, tilted, _ = path.robot.rest(q, own, m.tool)
+            back = rotation_vectors(turned @ tilted.swapaxes(1, 2))
+            back = back - {"any": 0.0, "axis": (back @ spindle) * spindle, "none": back}[m.turns]
+            place, rotation = place + wanted - real, rotations(back) @ rotation
+        return turns[0].T @ (place - wanted)[0]
 
-    return deflect
+    return correct
 
 
 def _cuts(motions: list[Motion]) -> list[tuple[int, int]]:
@@ -200,58 +208,34 @@ def _samples(path: Path, low: int, high: int, step: float) -> np.ndarray:
 
 
 def _along(wanted: Path, cut: tuple, path: Path, rows: tuple, one: Field, nodes: tuple, step: float) -> dict:
-    robot = path.robot
     label = _samples(path, *rows, step)
+    tools = Tools(path, rows, label, nodes)
+    place, lost = find_places(wanted, cut, one, label, tools)
+    for _ in range(ROUNDS):
+        distance = np.linalg.norm(tools.loaded(one.at(place))[0] - wanted.points(place, *cut), axis=1)
+        more = _beside_worst(label, distance)
+        finer = Tools(path, rows, more, nodes)
+        found, gone = settle_places(
+            wanted, cut, one, np.interp(more, label, place), finer.loaded, reaches=BETWEEN
+        )
+        label = np.concatenate([label, more[~gone]])
+        order = np.argsort(label, kind="stable")
+        label = label[order]
+        place, lost = (np.concatenate(two)[order] for two in ((place, found[~gone]), (lost, gone[~gone])))
+        tools = Tools(path, rows, label, nodes)
     motion, _ = path.find(label, *rows)
-    tool = path.motions[rows[0]].tool
-    position, rotation, outside = path.at(label, *rows)
-    command, turned = path.in_robot(motion, position, rotation, outside)
-    guess = np.stack([np.interp(label, nodes[0], nodes[1][:, j]) for j in range(6)], axis=1)
-    q = robot.settle(command, turned, tool, guess)
-    turns, places = path.frames(motion, outside)
-    to_base = turns.swapaxes(1, 2)  # from the robot's axes to the base's
-
-    def loaded(wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Tool (S, 3), (S, 3, 3) in the base and its compliance (S, 3, 6) under wrenches (S, 6) in base axes."""
-        own = (wrench.reshape(-1, 2, 3) @ to_base).reshape(-1, 6)
-        place, tilted, compliance = robot.rest(q, own, tool)
-        gives = np.concatenate([to_base @ compliance[:, :3, k : k + 3] @ turns for k in (0, 3)], axis=2)
-        return np.einsum("kij,kj->ki", to_base, place - places), to_base @ tilted, gives
-
-    low, high = wanted.start[cut[0]], wanted.start[cut[1] + 1]
-    share = (label - label[0]) / max(label[-1] - label[0], 1e-12)
-    wrench = one.at(low + share * (high - low))
-    for _ in range(MARCHES):
-        there, tilted, gives = loaded(wrench)
-        place = _march(wanted, cut, one, label, there, wrench, gives)
-        place, lost = _settled(wanted, cut, one, place, loaded)
-        if not lost.any():
-            break
-        wrench = one.at(place)
-    there, tilted, gives = loaded(one.at(place))
-    # beside a corner places may have been looked for on the wrong side: those between the good ones are others
-    away = np.linalg.norm(there - wanted.points(place, *cut), axis=1)
-    near = np.lib.stride_tricks.sliding_window_view(np.pad(away, BESIDE, mode="edge"), 2 * BESIDE + 1)
-    good = ~lost & (away <= 2.0 * np.median(near, axis=1) + 1e-7)
-    between = np.interp(label, label[good], place[good]) if good.any() else place
-    other, still = _settled(wanted, cut, one, between, loaded, CLOSE)
-    nearer = ~still & (
-        lost | (np.linalg.norm(loaded(one.at(other))[0] - wanted.points(other, *cut), axis=1) < away)
-    )
-    place, lost = np.where(nearer, other, place), lost & ~nearer
     wrench = one.at(place)
-    there, tilted, gives = loaded(wrench)
+    there, tilted, _ = tools.loaded(wrench)
     goal, straight, _ = wanted.at(place, *cut)
     error = there - goal
     tangent = wanted.direction(place, *cut)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     along = (error * tangent).sum(1)
     spindle = path.motions[rows[0]].spindle
-    own = (wrench.reshape(-1, 2, 3) @ to_base).reshape(-1, 6)
     some = np.unique(
-        np.append(np.linspace(0, len(q) - 1, 12).astype(int), np.argsort(-(error**2).sum(1))[:4])
+        np.append(np.linspace(0, len(label) - 1, 12).astype(int), np.argsort(-(error**2).sum(1))[:4])
     )
-    agree = check_on_mujoco(robot, q[some], own[some], tool)
+    agree = check_on_mujoco(path.robot, tools.q[some], tools.own(wrench)[some], tools.tool)
     if agree > MATCH:
         raise ArithmeticError(f"the judge's chain and MuJoCo differ by {agree:.1e} m")
     return {
@@ -270,131 +254,19 @@ def _along(wanted: Path, cut: tuple, path: Path, rows: tuple, one: Field, nodes:
     }
 
 
-def _settled(
-    wanted: Path, cut: tuple, one: Field, place: np.ndarray, loaded: Callable, reaches: tuple = REACHES
-) -> tuple[np.ndarray, np.ndarray]:
-    """Labels (S,) near ``place`` at which the tool, under the wrench of that place, has the path square to it, and
-    which were not found; ``loaded``: wrenches to the tool and its compliance."""
-    for _ in range(ROUNDS):
-        wrench = one.at(place)
-        there, _, gives = loaded(wrench)
-        found, lost = _refined(wanted, cut, one, place, there, wrench, gives, reaches)
-        moved, place = np.abs(found - place).max(), found
-        if moved < SETTLED:
-            break
-    return place, lost
+def _beside_worst(label: np.ndarray, distance: np.ndarray) -> np.ndarray:
+    """Labels between the samples ``label`` (S,) beside those that are farther off than their neighbours, the largest
+    first: a peak between two samples is not seen by them."""
+    beside = np.pad(distance, 1, constant_values=-1.0)
+    peaks = np.flatnonzero((distance >= beside[:-2]) & (distance >= beside[2:]))
+    worst = peaks[np.argsort(-distance[peaks], kind="stable")[:WORST]]
+    start = np.unique(np.clip(np.concatenate([worst - 1, worst]), 0, len(label) - 2))
+    parts = np.arange(1, PARTS) / PARTS
+    return (label[start, None] + parts * (label[start + 1] - label[start])[:, None]).ravel()
 
 
 def _between(one: np.ndarray, two: np.ndarray) -> np.ndarray:
     return np.arctan2(np.linalg.norm(np.cross(one, two), axis=1), (one * two).sum(1))
-
-
-def _march(
-    wanted: Path,
-    cut: tuple,
-    one: Field,
-    label: np.ndarray,
-    there: np.ndarray,
-    wrench: np.ndarray,
-    gives: np.ndarray,
-) -> np.ndarray:
-    """(S,) labels, on a grid, that the tool passes in turn.
-
-    At each sample the places in a window at which the path is square to the way to the tool are candidates.  Of all
-    ways through them that is taken which is nearest to the tool, and which goes on along the path as the program goes
-    on: a path that comes back the same way is not taken for its first leg again."""
-    low, high = wanted.start[cut[0]], wanted.start[cut[1] + 1]
-    grid = np.linspace(low, high, min(max(int((high - low) / GRID), 8), POINTS) + 1)
-    points, forces = wanted.points(grid, *cut), one.at(grid)
-    tangents = wanted.direction(grid, *cut)
-    free = there - np.einsum("kij,kj->ki", gives, wrench)
-    reach = np.linalg.norm(np.einsum("kij,kj->ki", gives, wrench), axis=1).max()
-    ahead = np.append(0.0, np.diff(label))
-    size = grid[1] - grid[0]
-    window, last, farthest = int((1.5 * reach + 2 * MM) / size) + 2, 0, 0
-    steps = (ahead * 1.5 / size).astype(int) + 2 * window
-    candidates, costs = [], []
-    for k in range(len(label)):
-        a, b = max(farthest - window, 0), min(last + steps[k], len(grid) - 1) + 1
-        beside = free[k] + forces[a:b] @ gives[k].T - points[a:b]
-        ahead_of = np.einsum("ij,ij->i", beside, tangents[a:b])
-        square = np.einsum("ij,ij->i", beside, beside)
-        here = np.flatnonzero((ahead_of[:-1] > 0) & (ahead_of[1:] <= 0))
-        here = np.where(square[here] < square[here + 1], here, here + 1)
-        if a == 0 and ahead_of[0] <= 0:
-            here = np.append(here, 0)
-        if b == len(grid) and ahead_of[-1] >= 0:
-            here = np.append(here, len(square) - 1)
-        if not len(here):
-            here = np.array([square.argmin()])
-        last = a + int(here[square[here].argmin()])
-        farthest = max(farthest, last)
-        candidates.append(a + here)
-        costs.append(square[here] * (max(ahead[k], 0.1 * MM) / NEARBY**2))
-    return grid[_cheapest(candidates, costs, ahead / size, size)]
-
-
-def _cheapest(candidates: list, costs: list, ahead: np.ndarray, size: float) -> np.ndarray:
-    """One candidate of each sample, so that the sum of ``costs`` and of what they are off the program's own steps
-    ``ahead`` (S,), in grid steps of ``size`` [m], is least."""
-    total, came = costs[0] + candidates[0] * size, []
-    for k in range(1, len(candidates)):
-        if len(candidates[k]) == 1 and len(candidates[k - 1]) == 1:
-            came.append(np.zeros(1, int))
-            total = costs[k]
-            continue
-        off = np.abs(candidates[k][:, None] - candidates[k - 1] - ahead[k]) * size + total
-        came.append(off.argmin(1))
-        total = costs[k] + off.min(1)
-    chosen = [int(total.argmin())]
-    for back in reversed(came):
-        chosen.append(int(back[chosen[-1]]))
-    return np.array([c[i] for c, i in zip(candidates, reversed(chosen), strict=True)])
-
-
-def _refined(
-    wanted: Path,
-    cut: tuple,
-    one: Field,
-    place: np.ndarray,
-    there: np.ndarray,
-    wrench: np.ndarray,
-    gives: np.ndarray,
-    reaches: tuple,
-) -> tuple[np.ndarray, np.ndarray]:
-    """The labels (S,) near ``place`` at which the path is square to the way to the tool, by bisection and
-    secants; which were not found."""
-    ends = wanted.start[cut[0]], wanted.start[cut[1] + 1]
-    size = max(GRID, (ends[1] - ends[0]) / POINTS)
-
-    def ahead_of(rows: np.ndarray, at: np.ndarray) -> np.ndarray:
-        tool = there[rows] + np.einsum("kij,kj->ki", gives[rows], one.at(at) - wrench[rows])
-        return ((tool - wanted.points(at, *cut)) * wanted.direction(at, *cut)).sum(1)
-
-    rows = np.arange(len(place))
-    a, b = place.copy(), place.copy()
-    fa, fb = np.zeros(len(rows)), np.zeros(len(rows))
-    lost = np.ones(len(rows), bool)
-    for reach in reaches:
-        some = np.flatnonzero(lost)
-        a[some], b[some] = (np.clip(place[some] + side * reach * size, *ends) for side in (-1, 1))
-        fa[some], fb[some] = ahead_of(some, a[some]), ahead_of(some, b[some])
-        lost = ((fa <= 0) & (a > ends[0])) | ((fb >= 0) & (b < ends[1]))
-    found = np.where(fa <= 0, a, b)
-    rows = np.flatnonzero((fa > 0) & (fb < 0))
-    a, b, fa, fb = a[rows], b[rows], fa[rows], fb[rows]
-    for turn in range(60):
-        if not len(rows):
-            break
-        middle = 0.5 * (a + b) if turn % 3 == 2 else a + (b - a) * fa / (fa - fb)
-        f = ahead_of(rows, middle)
-        found[rows] = middle
-        done = (np.abs(f) < 1e-13) | (b - a < 1e-12)
-        left = f > 0
-        a, fa = np.where(left, middle, a), np.where(left, f, fa)
-        b, fb = np.where(left, b, middle), np.where(left, fb, f)
-        rows, a, b, fa, fb = (v[~done] for v in (rows, a, b, fa, fb))
-    return found, lost
 
 
 def _missed(wanted: Path, cut: tuple, place: np.ndarray, there: np.ndarray) -> float:

@@ -23,7 +23,8 @@ class Motion:
     approximation [m]: 0 an exact stop, CONTINUOUS no stop and no stated distance.  external: E1 .. E6 [mm or deg].
     force: six numbers and their frame, None in air.  status, turn: of a PTP.  orientation_type, circle_type: #VAR,
     #CONSTANT, #JOINT; #BASE, #PATH.  block: number of the spline block.  words (3,)
-    [rad]: rotary A, B, C that turn the tool; they run evenly."""
+    [rad]: rotary A, B, C that turn the tool; they run evenly.  turns: the turns that another target can state, "any",
+    those of the tool's "axis", or "none"."""
 
     kind: str
     line: int
@@ -47,6 +48,7 @@ class Motion:
     circle_type: str = "#BASE"
     block: int = 0
     words: np.ndarray | None = None
+    turns: str = "any"
 
     @property
     def air(self) -> bool:

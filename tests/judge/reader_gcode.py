@@ -103,6 +103,7 @@ class _Reader:
         new.rotation = about(2, c) @ about(1, b) @ about(0, a) @ self.cell.orientation
         if self.tip and any(k in self.stated for k in "ABC"):
             new.words = np.array([a, b, c])
+        new.turns = "none" if new.words is None else "axis"
         new.approximation = 0.0 if exact else self.approximation
         if self.move in (2, 3):
             self.arc(new, np.array([before[k] for k in "XYZ"]) * MM, values)
