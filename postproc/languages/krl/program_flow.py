@@ -186,7 +186,8 @@ class ProgramFlow(Calls):
         if not item.code.isascii() and kind != "motion" and has_foreign_letters(item.code):
             self._report_letters(item)
         run.variables.line = item.line
-        self._call_functions(item)
+        if b"(" in item.code:
+            self._call_functions(item)
         if pc in run.survey.events:
             there = self._block_event(pc, item)
             if there is not None or not self.reachable:
