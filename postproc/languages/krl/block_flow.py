@@ -152,8 +152,9 @@ class BlockFlow(OpenBlocks):
     def _can_be_decided(self, block: Block) -> bool:
         """Whether the condition of an UNTIL is a constant before its loop, or the loop may make it one."""
         text = self._item(block.end).code[5:]
-        changed = "all" in block.effects or not block.effects.isdisjoint(identifiers(text))
-        return changed or isinstance(self.run.value(text), bool)
+        if "all" in block.effects or not block.effects.isdisjoint(identifiers(text)):
+            return block.end - block.start <= BUDGET  # so long a one is not followed to a second pass
+        return isinstance(self.run.value(text), bool)
 
     def _bounds(self, item: Statement) -> tuple[bytes, list[Value]] | None:
         """Counter, and first value, last value and step of a FOR."""

@@ -73,6 +73,8 @@ _DECLARED = re.compile(
 _ITEM = re.compile(rb"(" + NAME + rb")[ \t]*(?:\[([^\]]*)\])?[ \t]*(=[ \t]*)?")
 _STRING = re.compile(rb'"[^"\r\n]*"?')
 _BRACKET = re.compile(rb'"[^"\r\n]*"?|[{}()\[\],]')
+_FLAT = re.compile(rb'(?:[^"{}()\[\],]|"[^"\r\n]*+"|\{(?:[^"{}()\[\]]|"[^"\r\n]*+"|\[\])*+\})*+(?=,|\Z)')
+"""A value without brackets but those of a plain aggregate."""
 _BLANKS = re.compile(rb"[ \t]*")
 _IDENTIFIER = re.compile(rb"(?<![A-Za-z0-9_$#'])" + NAME)
 _NUMBER = re.compile(rb"[-+]?[ \t]*+(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d{1,4})?\Z")
@@ -340,6 +342,8 @@ def _skip(code: bytes, place: int) -> int:
 
 def value_end(code: bytes, start: int) -> int:
     """Where a value that starts at ``start`` ends: at the comma outside of all braces, or at the end."""
+    if plain := _FLAT.match(code, start):
+        return plain.end()
     depth = 0
     for found in _BRACKET.finditer(code, start):
         letter = found[0]

@@ -147,14 +147,20 @@ class ProgramFlow(Calls):
                 bulks.add(id(chunk.bulk))
         run.idle, run.rows.never_from = True, len(run.rows)
         for item in run.code:
-            run.state, run.routine = ModalState(sources=frozenset([ELSEWHERE])), None
             if isinstance(item, VectorisedLines):
                 if id(item) not in bulks:
+                    self._anywhere()
                     motions.move_bulk(run, item)
             elif item.kind == "motion" and item.line not in lines:
+                self._anywhere()
                 motions.move(run, item)
             elif item.kind == "strange" and item.line not in lines and run.survey.has_routine:
+                self._anywhere()
                 motions.unknown_motion(run, item)
+
+    def _anywhere(self) -> None:
+        """Nothing is known."""
+        self.run.state, self.run.routine = ModalState(sources=frozenset([ELSEWHERE])), None
 
     def _step(self, pc: int) -> int | None:
         """Takes up a statement; gives the index of the next one, None after the end."""

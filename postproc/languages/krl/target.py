@@ -13,6 +13,7 @@ from postproc.languages.krl.spatial import Numbers
 
 Six = tuple[float | None, float | None, float | None, float | None, float | None, float | None]
 NOWHERE = (-1,) * 6
+_NONE: Six = (None,) * 6
 NAN = float("nan")
 
 COMPONENTS = {b"X": 0, b"Y": 1, b"Z": 2, b"A": 3, b"B": 4, b"C": 5}
@@ -28,11 +29,21 @@ _KEY = re.compile(rb"[ \t]*(" + NAME + rb")((?:[ \t]*\[[^\],]*\])?)[ \t]*")
 _END = rb"[ \t]*+(?:,(?![ \t]*+\})[ \t]*+|(?=\}))"
 _REAL = rb"[ \t]++([-+]?\d{1,15}+(?:\.\d{0,20}+)?+(?:E[-+]?\d{1,2}+)?+)" + _END
 _BITS = rb"(?=[ \t'])[ \t]*+(\d{1,9}+|'B[01]{1,30}+')" + _END
+_EXTERNALS = b"".join(rb"(?:E%d%s)?+" % (i, _REAL) for i in range(1, 7))
+_TAGGED = rb"\{[ \t]*+(?:(?:%s)[ \t]*+:[ \t]*+)?+"
 _PLAIN = re.compile(
-    rb"\{[ \t]*+"
+    _TAGGED % rb"FRAME|(?:E[36])?POS"
     + b"".join(rb"(?:%s%s)?+" % (key, _REAL) for key in COMPONENTS)
     + b"".join(rb"(?:%s%s)?+" % (key, _BITS) for key in _STATES)
-    + b"".join(rb"(?:E%d%s)?+" % (i, _REAL) for i in range(1, 7))
+    + _EXTERNALS
+    + rb"\}\Z",
+    re.I,
+)
+_PLAIN_AXES = re.compile(
+    _TAGGED % rb"(?:E[36])?AXIS"
+    + rb"(?=(A))"
+    + b"".join(rb"(?:%s%s)?+" % (key, _REAL) for key in AXES)
+    + _EXTERNALS
     + rb"\}\Z",
     re.I,
 )
@@ -190,10 +201,10 @@ def parse(text: bytes, at: int, file: int, evaluate: Evaluate | None = None) -> 
 
 def plain(raw: bytes, begin: int, end: int, file: int) -> KrlTarget | None:
     """The target in bytes ``begin`` to ``end`` of document ``file``, where all are literals in their usual order, one
-    of X .. C among them; else None."""
+    of X .. C or A1 .. A6 among them; else None."""
     found = _PLAIN.match(raw, begin, end)
     if found is None:
-        return None
+        return _plain_axes(raw, begin, end, file)
     start, stop = zip(*found.regs[1:7], strict=True)
     insert = max(stop)
     if insert < 0:
@@ -207,10 +218,22 @@ def plain(raw: bytes, begin: int, end: int, file: int) -> KrlTarget | None:
     if last is None or last <= _CARTESIAN:
         return KrlTarget(values, start, stop, files, None, -1, -1, insert, file)
     status, turn = (-1 if bits is None else int(number(bits) or 0) for bits in given[6:8])
-    external = tuple(
-        [(b"E%d" % i, float(word), word) for i, word in enumerate(given[8:], 1) if word is not None]
-    )
-    return KrlTarget(values, start, stop, files, None, status, turn, insert, file, external)
+    return KrlTarget(values, start, stop, files, None, status, turn, insert, file, _stated(given[8:]))
+
+
+def _plain_axes(raw: bytes, begin: int, end: int, file: int) -> KrlTarget | None:
+    found = _PLAIN_AXES.match(raw, begin, end)
+    if found is None:
+        return None
+    given = found.groups()
+    axes = six([None if literal is None else float(literal) for literal in given[1:7]])
+    external = _stated(given[7:])
+    return KrlTarget(_NONE, axes=axes, insert=found.start(1), home=file, external=external)
+
+
+def _stated(axes: Sequence[bytes | None]) -> External:
+    """E1 .. E6 of their literals."""
+    return tuple([(b"E%d" % i, float(word), word) for i, word in enumerate(axes, 1) if word is not None])
 
 
 def _parse(text: bytes, at: int, file: int, evaluate: Evaluate | None) -> KrlTarget | UnknownValue:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from postproc.base.arrays import Bools, FewRows, Floats, Ints, is_shared
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
-from postproc.languages.krl.controller_data import with_declared_bases
+from postproc.languages.krl.controller_data import with_declared
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.modal_state import Source
 from postproc.languages.krl.motion_rows import MotionRows, RowRefusal
@@ -47,7 +47,8 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
     _refuse_several_starts(rows, table, single)
     _lock(run)
     refused = _refused(rows, table)
-    table.base, frames = with_declared_bases(run.declarations.bases, table.base, run.frames.refs())
+    table.base, frames = with_declared(run.declarations.frames, b"BASE", table.base, run.frames.refs())
+    table.tool, frames = with_declared(run.declarations.frames, b"TOOL", table.tool, frames)
     table.base, table.tool, used = _used(table.base, table.tool, frames)
     table.blend *= MM
     n = len(rows)
