@@ -15,20 +15,22 @@ from postproc.base.units import DEG, MM
 from postproc.languages.krl.assignments import numbered_frame
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.external_axes import six
-from postproc.languages.krl.modal_state import NAN
+from postproc.languages.krl.modal_state import NAN, ZERO
 from postproc.languages.krl.spatial import Numbers
 from postproc.languages.krl.target import COMPONENTS, KrlTarget, parse
 from postproc.toolpath import FrameRef
 from postproc.toolpath.initial_state import InitialState, Symbol
 
 _ENTRY = re.compile(
-    rb"^[ \t]*+(BASE|TOOL)_DATA[ \t]*+\[[ \t]*+(\d{1,4})[ \t]*+\][ \t]*+=[ \t]*+(\{[^{}\r\n]*+\})", re.I | re.M
+    rb"^[ \t]*+(BASE|TOOL)_DATA[ \t]*+\[[ \t]*+(\d{1,4})[ \t]*+\][ \t]*+=[ \t]*+(\{[^{}\r\n]*+\})",
+    re.I | re.M,
 )
 
 
 def declared_frames(documents: Iterable[Document]) -> dict[str, tuple[Numbers, str]]:
     """``BASE_DATA[n]`` or ``TOOL_DATA[n]`` -> X..C [mm, deg] as the controller's own files ($config.dat) state it, and
-    the file; what two of them state differently is left out."""
+    the file; what two of them state differently is left out, and so are tools of zeros, which a controller has before
+    they are measured."""
     found: dict[str, tuple[Numbers, str]] = {}
     different: set[str] = set()
     for document in documents:
@@ -37,6 +39,8 @@ def declared_frames(documents: Iterable[Document]) -> dict[str, tuple[Numbers, s
         for said in _ENTRY.finditer(document.raw):
             entry, target = entry_of(said[1].upper(), int(said[2])), parse(said[3], 0, -1)
             values = target.numbers if isinstance(target, KrlTarget) else None
+            if values == ZERO and entry.startswith("TOOL"):
+                values = None
             if values is None or found.setdefault(entry, (values, document.path.name))[0] != values:
                 different.add(entry)
     return {entry: frame for entry, frame in found.items() if entry not in different}
