@@ -294,6 +294,9 @@ def numbered_frame(run: ExecutionContext, table: bytes, at: int, line: int) -> F
     if at == 0:
         return run.frames.known(0, ZERO, line)
     entry = b"[%d]" % at
+    if table + b"_DATA" in run.survey.later:
+        name = f"{table.decode()}_DATA"
+        return UnknownValue("KRL012", f"{name} is changed by an interrupt or a trigger")
     value = run.variables.get(table + b"_DATA", entry)
     if value is None and not run.survey.table_entries.isdisjoint((table + b"_DATA" + entry, None)):
         name = f"{table.decode()}_DATA[{at}]"

@@ -76,7 +76,7 @@ class BlockFlow(OpenBlocks):
         clause = _WITH.search(item.code)
         if self.reachable and clause and with_clause(run, item, clause[1]) is not None:
             run.forget({"base", "tool"}, f"in the spline of line {block.line}: its WITH is not understood")
-        enters = block.word == b"SPLINE" and not run.state.triggered
+        enters = block.word == b"SPLINE" and not run.state.no_insert
         run.spline = SplineBlock(block.line, frame.checkpoint.counts[0], enters)
 
     def _open_branches(self, pc: int, item: Statement, block: Block) -> int:

@@ -86,7 +86,7 @@ def read(
     surveyed = program_structure(
         _statements(code), effects, {**others.directions(), **dict(_directions(code))}
     )
-    others.share(surveyed)
+    others.share(surveyed, declarations.types.keys() - declarations.shared)
     read = (*documents, *references, *siblings)
     has_tcp = any(_TCP.search(document.raw) for document in read)
     has_turning = any(_TURNING.search(document.raw) for document in read)
