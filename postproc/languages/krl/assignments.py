@@ -108,6 +108,8 @@ def with_clause(run: ExecutionContext, statement: Statement, clause: bytes) -> R
             return RowRefusal("KRL001", f"'{shown(clause[place:end])}' is not understood")
         assign(run, statement, said, here=True)
         place = end + 1
+        if end < len(clause) and not clause[place:].strip():
+            return RowRefusal("KRL001", "a value is missing after the last comma of its WITH")
     return None
 
 

@@ -30,6 +30,8 @@ from postproc.languages.krl.other_modules import is_module, read_modules, visibl
 from postproc.languages.krl.program_flow import ProgramFlow
 from postproc.languages.krl.program_structure import ProgramStructure, program_structure
 from postproc.languages.krl.scan import scan
+from postproc.languages.krl.statement_effects import HIDDEN
+from postproc.languages.krl.statement_forms import is_well_formed
 from postproc.languages.krl.target import shown
 from postproc.languages.krl.to_toolpath import to_toolpath
 from postproc.languages.krl.variables import Variables
@@ -113,6 +115,7 @@ def read(
             if reading == MOST_READINGS - 1:
                 unfollowed = _nothing_followed(surveyed)
     _report_structure(run)
+    _report_forms(run)
     marker_at = _marker_at(source, code)
     toolpath, text, refusals = to_toolpath(run, places)
     entries = _frames_used(toolpath)
@@ -226,6 +229,16 @@ def _report_structure(run: ExecutionContext) -> None:
     if not run.survey.has_routine:
         first = next((n for n, a, b in lines(run.document) if run.document.raw[a:b].strip()), 1)
         run.findings.append(Finding("KRL018", "the file has no DEF", name, first, 1))
+
+
+def _report_forms(run: ExecutionContext) -> None:
+    """Reports statements with words that have no meaning there; what may be a motion is a row, refused."""
+    for item in run.code:
+        if not isinstance(item, Statement) or is_well_formed(item):
+            continue
+        if item.kind != "other" or not HIDDEN.search(item.code):
+            message = f"'{shown(item.code)}' is not understood; what it does is not known"
+            run.add_finding("KRL034", message, item)
 
 
 def _marker(raw: bytes) -> Span | None:

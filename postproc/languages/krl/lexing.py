@@ -66,7 +66,7 @@ _ASSIGNMENT = re.compile(
     rb"((?:\.[ \t]*+" + NAME + rb"(?:\[[^\]]*+\])?[ \t]*+)*+)=(?!=)[ \t]*+"
 )
 _CALL = re.compile(rb"(" + NAME + rb")[ \t]*\((.*)\)\Z", re.S)
-_DECLARED = re.compile(
+DECLARED = re.compile(
     rb"(?:GLOBAL[ \t]+)?(?:DECL[ \t]+)?(GLOBAL[ \t]+)?(CONST[ \t]+)?(" + NAME + rb")[ \t]+(?=[A-Za-z_$])",
     re.I,
 )
@@ -311,7 +311,7 @@ def assignment(code: bytes, at: int) -> Assignment | None:
 
 def declaration(code: bytes, at: int) -> Declared | None:
     """``[DECL] [GLOBAL] TYPE NAME[[n]] [= value] {, ...}``; None if the code is none."""
-    head = _DECLARED.match(code)
+    head = DECLARED.match(code)
     if head is None or head[3].upper() in (b"INTERRUPT", b"DECL"):
         return None
     is_global = head[1] is not None or code[:6].upper() == b"GLOBAL"

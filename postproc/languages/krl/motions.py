@@ -108,6 +108,9 @@ def _move(run: ExecutionContext, statement: Statement, parts: Parts, reason: Row
         return
     if parts.not_understood:
         reason = reason or RowRefusal("KRL001", f"'{shown(parts.not_understood)}' is not understood")
+    if parts.reference is not None and not relative:
+        reference = code[slice(*parts.reference)]
+        reason = reason or RowRefusal("KRL001", f"'{shown(reference)}' is not understood")
     if kind == Kind.CIRC:
         move_on_arc(run, statement, parts, first, reason, blend)
         return

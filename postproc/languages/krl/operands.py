@@ -86,13 +86,17 @@ def take_apart(code: bytes, start: int) -> Parts:
             points.append((left, left + len(inner)))
         elif inner:
             odd = odd or inner
+        elif is_open and (at != start or token == b","):
+            odd = odd or b","
         if mark is None:
             break
         is_open, at = token == b",", mark.end()
         if token.startswith(b"#"):
+            odd = odd or (b"" if reference is None else token)
             reference = mark.span()
         elif token.upper() == b"WITH":
             clause = code[at:]
+            odd = odd or (b"" if clause.strip() else token)
             found = _LAST_SLUR.search(clause)
             if found:
                 approximations.append(b"C_" + found[1].upper())
