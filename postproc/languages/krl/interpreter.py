@@ -30,13 +30,12 @@ from postproc.languages.krl.other_modules import is_module, read_modules, visibl
 from postproc.languages.krl.program_flow import ProgramFlow
 from postproc.languages.krl.program_structure import ProgramStructure, program_structure
 from postproc.languages.krl.scan import scan
-from postproc.languages.krl.statement_effects import HIDDEN
 from postproc.languages.krl.statement_forms import is_well_formed
 from postproc.languages.krl.target import shown
 from postproc.languages.krl.to_toolpath import to_toolpath
 from postproc.languages.krl.variables import Variables
 from postproc.languages.krl.vectorised import Item
-from postproc.toolpath import FrameRef, Toolpath
+from postproc.toolpath import FrameRef, Kind, Toolpath
 from postproc.toolpath.initial_state import UNSTATED, InitialState, Symbol
 
 NO_SYMBOLS: Mapping[str, Symbol] = MappingProxyType({})
@@ -232,11 +231,11 @@ def _report_structure(run: ExecutionContext) -> None:
 
 
 def _report_forms(run: ExecutionContext) -> None:
-    """Reports statements with words that have no meaning there; what may be a motion is a row, refused."""
+    """Reports statements with words that have no meaning there, but those that are rows, refused as motions."""
+    chunks = (chunk for chunk in run.rows.chunks if isinstance(chunk, list))
+    rows = {row.line for chunk in chunks for row in chunk if row.kind == Kind.OTHER}
     for item in run.code:
-        if not isinstance(item, Statement) or is_well_formed(item):
-            continue
-        if item.kind != "other" or not HIDDEN.search(item.code):
+        if isinstance(item, Statement) and item.line not in rows and not is_well_formed(item):
             message = f"'{shown(item.code)}' is not understood; what it does is not known"
             run.add_finding("KRL034", message, item)
 

@@ -38,7 +38,9 @@ _TYPE = re.compile(rb"[ \t]*+" + NAME + rb"[ \t]*+:")
 _DECLARATION = re.compile(
     rb"[ \t]*+(" + NAME + rb")[ \t]*+(?:\[([^\[\]]*+)\][ \t]*+)?+(?:=(.*))?+[ \t]*+\Z", re.S
 )
-_RESERVED = (MOTIONS | OPENS | CLOSES.keys() | BRANCHES.keys() | KEPT) - {b"INI", b"SIGNAL"}
+_RESERVED = (
+    MOTIONS | OPENS | CLOSES.keys() | BRANCHES.keys() | KEPT | ALONE | {b"GOTO", b"RETURN", b"THEN", b"DECL"}
+) - {b"INI", b"SIGNAL"}
 _SIGNS = frozenset([b"+", b"-", b"NOT", b"B_NOT"])
 _BINARY = frozenset(
     b"+ - * / : == <> < > <= >= AND OR EXOR B_AND B_OR B_EXOR".split()
@@ -119,6 +121,7 @@ def _declares(code: bytes) -> bool:
     return all(
         item is not None
         and item[1].upper() not in _RESERVED
+        and not item[1].startswith(b"$")
         and (item[2] is None or _all_expressions(item[2]))
         and (item[3] is None or is_expression(item[3]))
         for item in items
