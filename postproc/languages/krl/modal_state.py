@@ -105,10 +105,10 @@ class ModalState:
     feed [m/s], blend [mm] ($APO.CDIS): NaN where not known; point: X..C of the last end point [mm, deg], stated in
     ``point_frames``, by the motion in ``point_line``; axes [deg]: those of the last end point, where it was
     programmed so; form: the inline form that was entered last; external [mm, deg]: E1..E6; external_apart: what the
-    program has set so that motions do not take them along; no_insert: why nothing can be inserted before the next motion, "" where it can;
-    root_set: the line, if any, from which on the program itself states where the robot is in the world; later_since:
-    the line, if any, from which on an interrupt or a trigger may change base or tool; later_speed: which of "feed" and
-    "apo" one may change.
+    program has set so that motions do not take them along; no_insert: why nothing can be inserted before the next
+    motion, "" where it can; root_set: the line, if any, from which on the program itself states where the robot is in
+    the world; later_since: the line, if any, from which on an interrupt or a trigger may change base or tool;
+    later_speed: which of "feed" and "apo" one may change.
     """
 
     base: FrameIndex | UnknownValue = NO_BASE

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +21,11 @@ from postproc.toolpath import Kind
 
 NOTHING = KrlTarget((None,) * 6)
 """Of a motion without a readable target."""
+
+
+def _columns(entry: type[tuple[Any, ...]], rows: Sequence[Any]) -> Any:
+    """The entries of named tuples as one of columns."""
+    return entry(*zip(*rows, strict=True))
 
 
 class Spots:
@@ -42,8 +50,8 @@ class Spots:
 
     def take(self, part: slice, rows: list[MotionRow]) -> None:
         """Rows that were read alone."""
-        columns = MotionRow(*zip(*rows, strict=True))  # type: ignore[arg-type]
-        targets = KrlTarget(*zip(*[t or NOTHING for t in columns.target], strict=True))  # type: ignore[union-attr]
+        columns = _columns(MotionRow, rows)
+        targets = _columns(KrlTarget, [target or NOTHING for target in columns.target])
         self.motion[part] = columns.motion
         self.inherits[part] = columns.inherits
         self.start[part], self.stop[part], self.file[part] = targets.start, targets.stop, targets.file
@@ -133,9 +141,9 @@ class MotionTable:
     def _fill(self, at: int, rows: list[MotionRow]) -> None:
         part = slice(at, at + len(rows))
         self.loose += zip(range(at, at + len(rows)), rows, strict=True)
-        columns = MotionRow(*zip(*rows, strict=True))  # type: ignore[arg-type]
+        columns = _columns(MotionRow, rows)
         self._place(part, np.array(columns.values))
-        states = [(-1, -1) if t is None else (t.status, t.turn) for t in columns.target]  # type: ignore[union-attr]
+        states = [(-1, -1) if t is None else (t.status, t.turn) for t in columns.target]
         self._state(part, *np.array(states, np.int32).T)
         self._external(part, np.array(columns.external))
         for array, column in (

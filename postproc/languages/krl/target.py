@@ -210,7 +210,7 @@ def plain(raw: bytes, begin: int, end: int, file: int) -> KrlTarget | None:
     if insert < 0:
         return None
     given = found.groups()
-    files = NOWHERE
+    files: tuple[int, ...] = NOWHERE
     if file >= 0:
         files = (file,) * 6 if -1 not in start else tuple([file if place >= 0 else -1 for place in start])
     values = six([None if literal is None else float(literal) for literal in given[:6]])
