@@ -35,9 +35,7 @@ LOOSE = frozenset(
 _PLAIN = re.compile(rb"[ \t]*+(?:#[ \t]*+)?+(?:" + NAME + rb"|[-+]?\d{1,15}+(?:\.\d{0,15}+)?+)[ \t]*+\Z")
 _FIELD = re.compile(rb"[ \t]*+" + NAME + rb"(?:[ \t]*+\[[^\[\]]*+\])?+(?=[ \t'\"#{+-])")
 _TYPE = re.compile(rb"[ \t]*+" + NAME + rb"[ \t]*+:")
-_DECLARATION = re.compile(
-    rb"[ \t]*+(" + NAME + rb")[ \t]*+(?:\[([^\[\]]*+)\][ \t]*+)?+(?:=(.*))?+[ \t]*+\Z", re.S
-)
+_DECLARATION = re.compile(rb"[ \t]*+(" + NAME + rb")[ \t]*+(?:\[([^\[\]]*+)\][ \t]*+)?+(?:=(.*))?+\Z", re.S)
 _RESERVED = (
     MOTIONS | OPENS | CLOSES.keys() | BRANCHES.keys() | KEPT | ALONE | {b"GOTO", b"RETURN", b"THEN", b"DECL"}
 ) - {b"INI", b"SIGNAL"}
@@ -68,11 +66,10 @@ _FOR = re.compile(
     re.I | re.S,
 )
 _LATER = re.compile(
-    rb"(?:GLOBAL[ \t]++)?+(?:INTERRUPT[ \t]++DECL[ \t]++(.*?)[ \t]WHEN(.*?)"
-    rb"|TRIGGER[ \t]++WHEN[ \t]++(?:DISTANCE|PATH)[ \t]*+=(.*?)[ \t]DELAY[ \t]*+=(.*?))"
-    + _WORD % b"DO" + rb"(.*?)(?:" + _WORD % b"PRIO" + rb"[ \t]*+=(.*))?\Z",
-    re.I | re.S,
-)  # fmt: skip
+    rb"(?<![A-Za-z0-9_$])(WHEN(?![A-Za-z0-9_$])|DO(?![A-Za-z0-9_$])|DELAY[ \t]*+=|PRIO[ \t]*+=)", re.I
+)
+_PLACE = re.compile(rb"[ \t]*+(?:DISTANCE|PATH)[ \t]*+=", re.I)
+_DECLARED = re.compile(rb"(?:GLOBAL[ \t]++)?+INTERRUPT[ \t]++DECL[ \t]", re.I)
 _SWITCHED = re.compile(rb"INTERRUPT[ \t]++(?:ON|OFF|ENABLE|DISABLE)\b(.*)\Z", re.I | re.S)
 
 
@@ -96,9 +93,8 @@ def _has_form(code: bytes) -> bool:
     found = re.match(NAME, code)
     word = found[0].upper() if found else b""
     rest = code[len(word) :].strip(b" \t")
-    pattern = _PATTERNS.get(word)
-    if pattern is not None:
-        parts = pattern.match(code)
+    if word in _PATTERNS:
+        parts = _PATTERNS[word].match(code)
         return parts is not None and all(is_expression(part) for part in parts.groups() if part is not None)
     if word == b"CASE":
         return bool(rest) and _all_expressions(rest)
@@ -131,11 +127,21 @@ def _declares(code: bytes) -> bool:
 def _is_later(code: bytes) -> bool:
     if switched := _SWITCHED.match(code):
         return not switched[1].strip() or is_expression(switched[1])
-    found = _LATER.match(code)
-    if found is None:
+    head, *parts = _LATER.split(code)
+    order = [word[:2].upper() for word in parts[0::2]]
+    texts = parts[1::2]
+    declared = _DECLARED.match(head)
+    if declared is not None:
+        texts, rest = [head[declared.end() :], *texts], order[:2] == [b"WH", b"DO"] and order[2:]
+    else:
+        place = _PLACE.match(texts[0]) if texts and head.strip().upper() == b"TRIGGER" else None
+        if place is None:
+            return False
+        texts, rest = [texts[0][place.end() :], *texts[1:]], order[:3] == [b"WH", b"DE", b"DO"] and order[3:]
+    if rest not in ([], [b"PR"]):
         return False
-    *values, does, priority = found.groups()
-    if not all(is_expression(text) for text in (*values, priority) if text is not None):
+    does = texts.pop(len(texts) - 1 - len(rest))
+    if not all(map(is_expression, texts)):
         return False
     text = does.strip(b" \t")
     said = assignment(text, 0)
