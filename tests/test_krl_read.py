@@ -379,7 +379,7 @@ POINTS = "DECL E6POS XP1={X 1,Y 2,Z 3,A 4,B 5,C 6}\nDECL E6POS XP2={X 1,Y 2,Z 3,
     [
         ('LIN XP1\nH50("a;b",XP1)\n', POINTS),
         ("LIN XP1\nIF XP1.X>5 THEN\nENDIF\n", POINTS),
-        ("LIN XP1\nTRIGGER WHEN DISTANCE=0 DELAY=0 DO log(XP1)\n", POINTS),
+        ("LIN XP1\nTRIGGER WHEN DISTANCE=0 DELAY=0 DO log(XP1.X+1)\n", POINTS),
         ("LIN XP1\nLIN XP1:{X 0,Y 0,Z 5,A 0,B 0,C 0}\n", POINTS),
         ("LIN XP1\nhere=XP1\n", POINTS),
         ("LIN XP1\n", POINTS.replace("DECL", "DECL GLOBAL")),

@@ -107,7 +107,7 @@ def test_the_cell_goes_before_the_files_and_then_none_is_read(tmp_path: Path) ->
     assert "base [6] tool [5]" in dump(program)[1]
     program = read(tmp_path, HEAD + f"$BASE=BASE_DATA[2]\nLIN {FULL}\n", {"$config.dat": CONFIG})
     assert said(program) == []
-    assert program.unresolved == {"BASE_DATA[2]"}
+    assert program.unresolved == {"BASE_DATA[2]", "TOOL_DATA[1]"}
 
 
 def test_what_the_last_run_left_in_a_file_is_not_known(tmp_path: Path) -> None:
@@ -239,6 +239,43 @@ def test_a_compensated_program_has_the_files_of_the_original(tmp_path: Path) -> 
     alone, _ = read_with_siblings(KrlDialect(), documents, ReadingSettings())
     there, _ = read_with_siblings(KrlDialect(), documents, ReadingSettings(), tmp_path)
     assert [dump(one)[0][-8:] for one in (alone, there)] == ["tool [1]", "tool [4]"]
+
+
+TOOLS = "DECL FRAME TOOL_DATA[16]\nTOOL_DATA[5]={X 10,Y 0,Z 200,A 90,B 0,C 0}\nTOOL_DATA[6]={X 0,Y 0,Z 0,A 0,B 0,C 0}"
+
+
+def test_a_tool_is_what_the_controller_states_where_the_cell_has_none(tmp_path: Path) -> None:
+    """Entry 5 of both tables is one frame to the program, and two in the file."""
+    text = f"$TOOL=TOOL_DATA[5]\n$BASE=BASE_DATA[5]\nLIN {FULL}\n"
+    config = dat(TOOLS + "\nBASE_DATA[5]={X 900,Y 0,Z 700,A 0,B 0,C 0}")
+    program = read(tmp_path, text, {"$config.dat": config})
+    path = program.toolpath
+    (message,) = said(program)
+    assert message.endswith(
+        "BASE_DATA[5] (where the cell has no such base), TOOL_DATA[5] (where the cell has no such tool)"
+    )
+
+    def place(tools: str) -> list[float]:
+        (tmp_path / "cell.yaml").write_text(f"robot: kuka_kr270\n{tools}")
+        found = frames_of(load_cell(tmp_path / "cell.yaml"), path, "part.src")
+        assert (found.base_in_robot.position[0] * 1000).round(6).tolist() == [900, 0, 700]
+        return [*(found.tool_in_flange.position[0] * 1000).round(6), found.tool_in_flange.rotation[0, 1, 0]]
+
+    assert place("") == pytest.approx([10, 0, 200, 1])
+    assert place("tools: {5: {x: 7, y: 8, z: 9, a: 0, b: 0, c: 0, axis: +z}}\n") == [7, 8, 9, 0]
+
+
+def test_a_tool_of_zeros_is_none_that_was_measured(tmp_path: Path) -> None:
+    text = f"$TOOL=TOOL_DATA[6]\n$BASE=BASE_DATA[5]\nLIN {FULL}\n"
+    program = read(tmp_path, text, {"$config.dat": dat(TOOLS)})
+    assert program.toolpath.frames[program.toolpath.tool[0]].declared is None
+    assert "TOOL_DATA[6]" in program.unresolved
+    (tmp_path / "cell.yaml").write_text(
+        "robot: kuka_kr270\nbases: {5: {x: 7, y: 8, z: 9, a: 0, b: 0, c: 0}}\n"
+    )
+    with pytest.raises(Refusal) as refusal:
+        frames_of(load_cell(tmp_path / "cell.yaml"), program.toolpath, "part.src")
+    assert [finding.code for finding in refusal.value.findings] == ["CEL002"]
 
 
 BASES = dat("DECL FRAME BASE_DATA[32]\nBASE_DATA[3]={X 100,Y 0,Z 0,A 90,B 0,C 0}\nBASE_DATA[4]={X 1}")

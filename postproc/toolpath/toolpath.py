@@ -45,8 +45,8 @@ class FrameRef:
 
     ``pose`` is the frame where the program itself states it (in the world for a base, on the flange for
     a tool); None where only the controller knows it, that is entry ``number`` of BASE_DATA / TOOL_DATA.
-    ``line`` is where it was set, for messages.  ``declared``: what the controller's own file states of a base whose
-    ``pose`` the program does not state; the cell's base of that number comes first.
+    ``line`` is where it was set, for messages.  ``declared``: what the controller's own file states of a frame whose
+    ``pose`` the program does not state; the cell's base or tool of that number comes first.
     """
 
     number: int | None

@@ -66,7 +66,7 @@ def move_on_arc(
     before = state.sources
     row = enter_motion(run, statement, Kind.CIRC, end_point, reason, blend, found, relative)
     if blend == 0:
-        run.rows.arc_blends[row] = state.blend
+        run.rows.arc_blends[row] = state.steady_blend
     if row in run.rows.reasons:
         run.rows.builds_on[row] = before
     if isinstance(first.target, KrlTarget):

@@ -108,6 +108,8 @@ def with_clause(run: ExecutionContext, statement: Statement, clause: bytes) -> R
             return RowRefusal("KRL001", f"'{shown(clause[place:end])}' is not understood")
         assign(run, statement, said, here=True)
         place = end + 1
+        if end < len(clause) and not clause[place:].strip():
+            return RowRefusal("KRL001", "a value is missing after the last comma of its WITH")
     return None
 
 
@@ -294,6 +296,9 @@ def numbered_frame(run: ExecutionContext, table: bytes, at: int, line: int) -> F
     if at == 0:
         return run.frames.known(0, ZERO, line)
     entry = b"[%d]" % at
+    if table + b"_DATA" in run.survey.later:
+        name = f"{table.decode()}_DATA"
+        return UnknownValue("KRL012", f"{name} is changed by an interrupt or a trigger")
     value = run.variables.get(table + b"_DATA", entry)
     if value is None and not run.survey.table_entries.isdisjoint((table + b"_DATA" + entry, None)):
         name = f"{table.decode()}_DATA[{at}]"

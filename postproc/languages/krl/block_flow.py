@@ -76,7 +76,7 @@ class BlockFlow(OpenBlocks):
         clause = _WITH.search(item.code)
         if self.reachable and clause and with_clause(run, item, clause[1]) is not None:
             run.forget({"base", "tool"}, f"in the spline of line {block.line}: its WITH is not understood")
-        enters = block.word == b"SPLINE" and not run.state.triggered
+        enters = block.word == b"SPLINE" and not run.state.no_insert
         run.spline = SplineBlock(block.line, frame.checkpoint.counts[0], enters)
 
     def _open_branches(self, pc: int, item: Statement, block: Block) -> int:
@@ -152,8 +152,9 @@ class BlockFlow(OpenBlocks):
     def _can_be_decided(self, block: Block) -> bool:
         """Whether the condition of an UNTIL is a constant before its loop, or the loop may make it one."""
         text = self._item(block.end).code[5:]
-        changed = "all" in block.effects or not block.effects.isdisjoint(identifiers(text))
-        return changed or isinstance(self.run.value(text), bool)
+        if "all" in block.effects or not block.effects.isdisjoint(identifiers(text)):
+            return block.end - block.start <= BUDGET  # so long a one is not followed to a second pass
+        return isinstance(self.run.value(text), bool)
 
     def _bounds(self, item: Statement) -> tuple[bytes, list[Value]] | None:
         """Counter, and first value, last value and step of a FOR."""

@@ -12,7 +12,7 @@ from postproc.languages.krl.expressions import Value
 from postproc.languages.krl.external_axes import apart
 from postproc.languages.krl.flow_frames import BlockFrame, LabelHead, Restart
 from postproc.languages.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, split_values
-from postproc.languages.krl.modal_state import ELSEWHERE, FrameRegister, ModalState
+from postproc.languages.krl.modal_state import ELSEWHERE, TRIGGERED, FrameRegister, ModalState
 from postproc.languages.krl.other_modules import take_exit
 from postproc.languages.krl.program_structure import Routine, closure
 from postproc.languages.krl.statement_effects import (
@@ -312,6 +312,7 @@ class Calls(BlockFlow):
             return
         run.unread.add(name)
         run.forget({"point", *words}, why)
+        run.state.no_insert = run.state.no_insert or f"{called} runs before it and is not read"
         if name.startswith(PATH_FROM_FILE):
             run.add_finding(
                 "KRL021", f"{called} reads its path from a file; that path is not corrected", item
@@ -352,16 +353,12 @@ class Calls(BlockFlow):
         """Takes up what else another module does, now or at a time of its own."""
         run, (module, _) = self.run, self.run.others.routines[name]
         state = run.state
-        if module.sets_root:
-            state.root_set = state.root_set or item.line
-            run.root_set = run.root_set or item.line
         if module.apart:
             state.external_apart = state.external_apart | {b"$ASYNC_AXIS"}
             state.external = apart(state.external)
-        state.triggered = state.triggered or module.has_trigger
-        if not module.survey.later_effects.isdisjoint(("base", "tool", "mode", "turning")):
-            state.later_since = state.later_since or item.line
-            run.later_since = run.later_since or item.line
+        if module.has_trigger:
+            state.no_insert = TRIGGERED
+        run.expect_later(module.survey.later_effects, item.line)
         for unread in run.others.unread[name]:
             file = module.document.path.name
             message = (

@@ -274,5 +274,13 @@ CODES = define(
             action="Load the same files on the controller; state in the cell (symbols:) what differs there.",
             example="$config.dat with FHOME and XHOME, in the folder System beside the program's folder.",
         ),
+        "KRL034": Code(
+            "warning",
+            "statement that is not understood",
+            meaning="The statement, or a word in it, is none that this tool knows.",
+            consequence="What it does is not known; the motions after it are read as if it did nothing.",
+            action="Correct the statement, or check that it changes no position, base or tool.",
+            example="`WAIT SEC 0.5 0.7`, or `IF $IN[1] THAN`.",
+        ),
     }
 )

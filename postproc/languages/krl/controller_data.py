@@ -15,48 +15,58 @@ from postproc.base.units import DEG, MM
 from postproc.languages.krl.assignments import numbered_frame
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.external_axes import six
-from postproc.languages.krl.modal_state import NAN
+from postproc.languages.krl.modal_state import NAN, ZERO
 from postproc.languages.krl.spatial import Numbers
 from postproc.languages.krl.target import COMPONENTS, KrlTarget, parse
 from postproc.toolpath import FrameRef
 from postproc.toolpath.initial_state import InitialState, Symbol
 
-_BASE = re.compile(
-    rb"^[ \t]*+BASE_DATA[ \t]*+\[[ \t]*+(\d{1,4})[ \t]*+\][ \t]*+=[ \t]*+(\{[^{}\r\n]*+\})", re.I | re.M
+_ENTRY = re.compile(
+    rb"^[ \t]*+(BASE|TOOL)_DATA[ \t]*+\[[ \t]*+(\d{1,4})[ \t]*+\][ \t]*+=[ \t]*+(\{[^{}\r\n]*+\})",
+    re.I | re.M,
 )
 
 
-def declared_bases(documents: Iterable[Document]) -> dict[int, tuple[Numbers, str]]:
-    """Number of a base -> X..C [mm, deg] as the controller's own files ($config.dat) state it, and the file; what two
-    of them state differently is left out."""
-    found: dict[int, tuple[Numbers, str]] = {}
-    different: set[int] = set()
+def declared_frames(documents: Iterable[Document]) -> dict[str, tuple[Numbers, str]]:
+    """``BASE_DATA[n]`` or ``TOOL_DATA[n]`` -> X..C [mm, deg] as the controller's own files ($config.dat) state it, and
+    the file; what two of them state differently is left out, and so are tools of zeros, which a controller has before
+    they are measured."""
+    found: dict[str, tuple[Numbers, str]] = {}
+    different: set[str] = set()
     for document in documents:
         if "config" not in document.path.stem.lower():
             continue
-        for said in _BASE.finditer(document.raw):
-            number, target = int(said[1]), parse(said[2], 0, -1)
+        for said in _ENTRY.finditer(document.raw):
+            entry, target = entry_of(said[1].upper(), int(said[2])), parse(said[3], 0, -1)
             values = target.numbers if isinstance(target, KrlTarget) else None
-            if values is None or found.setdefault(number, (values, document.path.name))[0] != values:
-                different.add(number)
-    return {number: base for number, base in found.items() if number not in different}
+            if values == ZERO and entry.startswith("TOOL"):
+                values = None
+            if values is None or found.setdefault(entry, (values, document.path.name))[0] != values:
+                different.add(entry)
+    return {entry: frame for entry, frame in found.items() if entry not in different}
 
 
-def with_declared_bases(
-    bases: Mapping[int, tuple[Numbers, str]], base: Ints, frames: tuple[FrameRef, ...]
+def entry_of(table: bytes, number: int | None) -> str:
+    """The name of an entry of BASE_DATA or TOOL_DATA; table: ``BASE`` or ``TOOL``."""
+    return f"{table.decode()}_DATA[{number}]"
+
+
+def with_declared(
+    declared: Mapping[str, tuple[Numbers, str]], table: bytes, used: Ints, frames: tuple[FrameRef, ...]
 ) -> tuple[Ints, tuple[FrameRef, ...]]:
-    """(N,) the indices ``base`` (N,) of the bases of motions, and the frames with what ``bases`` state of those without
-    a pose."""
+    """(N,) the indices ``used`` (N,) of the bases or tools of motions, and the frames with what ``declared`` states of
+    those without a pose."""
     more = list(frames)
     renamed = np.append(np.arange(len(frames)), -1)
-    for index in np.unique(base[base >= 0]).tolist():
+    for index in np.unique(used[used >= 0]).tolist():
         frame = frames[index]
-        if frame.pose is None and frame.number in bases:
-            values, _ = bases[frame.number]
+        entry = entry_of(table, frame.number)
+        if frame.pose is None and entry in declared:
+            values, _ = declared[entry]
             pose = Poses.from_abc(np.array(values[:3]) * MM, np.array(values[3:]) * DEG)
             renamed[index] = len(more)
             more.append(replace(frame, declared=pose))
-    return renamed[base], tuple(more)
+    return renamed[used], tuple(more)
 
 
 def start_with(run: ExecutionContext, initial: InitialState, symbols: Mapping[str, Symbol]) -> None:

@@ -46,8 +46,8 @@ class Declarations:
 
     values: points and constants; records: FDAT, LDAT, PDAT (key -> value); types: as they are declared; lines: name of
     a point with its index -> its declaration's line, where another one can be behind; shared: names that other
-    programs know too; origin: what only another file declares -> that file; bases: number
-    of an entry of BASE_DATA in the controller's own files -> X..C [mm, deg], and the file.
+    programs know too; origin: what only another file declares -> that file; frames: entries of
+    BASE_DATA and TOOL_DATA in the controller's own files -> X..C [mm, deg], and the file.
     """
 
     values: dict[bytes, Entry] = field(default_factory=dict)
@@ -57,7 +57,7 @@ class Declarations:
     declared: set[bytes] = field(default_factory=set)
     shared: set[bytes] = field(default_factory=set)
     origin: dict[bytes, str] = field(default_factory=dict)
-    bases: dict[int, tuple[Numbers, str]] = field(default_factory=dict)
+    frames: dict[str, tuple[Numbers, str]] = field(default_factory=dict)
 
 
 def read_references(result: Declarations, documents: Iterable[Document]) -> None:

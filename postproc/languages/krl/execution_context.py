@@ -15,7 +15,7 @@ from postproc.languages.krl.modal_state import ZERO, FrameRegister, ModalState, 
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.other_modules import OtherModules
 from postproc.languages.krl.program_structure import Block, ProgramStructure, Routine
-from postproc.languages.krl.statement_effects import Effects
+from postproc.languages.krl.statement_effects import Effect, Effects
 from postproc.languages.krl.target import UnknownValue, known, shown
 from postproc.languages.krl.variables import VariableFacts, Variables
 from postproc.languages.krl.vectorised import Item
@@ -47,7 +47,7 @@ class ExecutionContext:
     ``followed``: routines that ran.  ``idle``: what no flow leads to is listed.  ``opaque``: the block, if any, whose
     structure is not understood.  ``spline``: the spline block that is open.  ``has_tcp_mode``, ``has_turning``: some
     line names another interpolation mode, or another way of turning the tool, than the usual one.  ``initial``: what
-    holds where the program starts.  ``root_set``, ``later_since``: the first lines that set what ``ModalState`` calls
+    holds where the program starts.  ``root_set``, ``later_since``, ``later_speed``: what ``ModalState`` calls
     so.  ``others``: the modules that are read besides; ``effects_of_others``: what their routines
     change of what this one knows; ``unread``: routines that are called and not read; ``depth``:
     how many calls of other modules lead here.
@@ -78,6 +78,7 @@ class ExecutionContext:
     walked_rows: list[tuple[int, int, Routine]] = field(default_factory=list)
     root_set: int = 0
     later_since: int = 0
+    later_speed: frozenset[Effect] = frozenset()
     unread: set[bytes] = field(default_factory=set)
     depth: int = 0
 
@@ -89,11 +90,22 @@ class ExecutionContext:
         line, column = self.document.place(statement.at)
         self.findings.append(Finding(code, message, str(self.document.path), line, column))
 
+    def expect_later(self, effects: Effects, line: int) -> None:
+        """Takes up what an interrupt or a trigger may do at any time from ``line`` on."""
+        if not effects.isdisjoint(("base", "tool", "mode", "turning", "root")):
+            self.state.later_since = self.state.later_since or line
+            self.later_since = self.later_since or line
+        self.later_speed |= effects & {"feed", "apo"}
+        self.state.later_speed |= self.later_speed
+
     def forget(self, effects: Effects, why: str) -> None:
         """Makes unknown what ``effects`` name.  A variable that is forgotten may still hold any value that it had,
         so none of its literals can be changed for one motion alone."""
         words = {effect for effect in effects if isinstance(effect, str)}
         self.state.forget(words, why, self.has_tcp_mode, self.has_turning)
+        if "root" in words:
+            self.state.root_set = self.state.root_set or self.variables.line
+            self.root_set = self.root_set or self.variables.line
         unclear = UnknownValue("KRL002", f"its value is not known {why}")
         if "all" in words:
             self.variables.forget_all(unclear)

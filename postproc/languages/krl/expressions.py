@@ -21,7 +21,7 @@ Lookup = Callable[[bytes, bytes], Value | None]
 DEEPEST = 40
 """Nesting of brackets; a deeper expression is no KRL that anybody wrote."""
 
-_TOKEN = re.compile(
+TOKEN = re.compile(
     rb"[ \t]*(?:(?P<real>(?:\d+\.\d*|\.\d+|\d+(?=[eE]))(?:[eE][-+]?\d{1,4})?)|(?P<int>\d+)"
     rb"|(?P<radix>'[ \t]*[HhBb][ \t]*[0-9A-Fa-f]+[ \t]*')|(?P<text>\"[^\"]*\")|(?P<enum>#[ \t]*"
     + NAME
@@ -131,7 +131,7 @@ class _Parser:
 
     def _next(self) -> None:
         self.place = self.after
-        found = _TOKEN.match(self.text, self.after)
+        found = TOKEN.match(self.text, self.after)
         if found is None:
             self.kind, self.token = "end", b""
             if self.text[self.after :].strip():

@@ -13,7 +13,7 @@ from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
 from postproc.base.memory import without_garbage_collection
 from postproc.languages.dialect import MARK, Program
-from postproc.languages.krl.controller_data import declared_bases, start_with
+from postproc.languages.krl.controller_data import declared_frames, entry_of, start_with
 from postproc.languages.krl.data import (
     Declarations,
     at_the_start,
@@ -30,11 +30,12 @@ from postproc.languages.krl.other_modules import is_module, read_modules, visibl
 from postproc.languages.krl.program_flow import ProgramFlow
 from postproc.languages.krl.program_structure import ProgramStructure, program_structure
 from postproc.languages.krl.scan import scan
+from postproc.languages.krl.statement_forms import is_well_formed
 from postproc.languages.krl.target import shown
 from postproc.languages.krl.to_toolpath import to_toolpath
 from postproc.languages.krl.variables import Variables
 from postproc.languages.krl.vectorised import Item
-from postproc.toolpath import FrameRef
+from postproc.toolpath import FrameRef, Kind, Toolpath
 from postproc.toolpath.initial_state import UNSTATED, InitialState, Symbol
 
 NO_SYMBOLS: Mapping[str, Symbol] = MappingProxyType({})
@@ -80,13 +81,13 @@ def read(
     data = [*references, *(one for one in siblings if not is_module(one))]
     read_references(declarations, data)
     bind_symbols(declarations, symbols, own)
-    declarations.bases = declared_bases(data)
+    declarations.frames = declared_frames(data)
     others = read_modules(siblings, data, symbols)
     effects = visible(others, declarations)
     surveyed = program_structure(
         _statements(code), effects, {**others.directions(), **dict(_directions(code))}
     )
-    others.share(surveyed)
+    others.share(surveyed, declarations.types.keys() - declarations.shared)
     read = (*documents, *references, *siblings)
     has_tcp = any(_TCP.search(document.raw) for document in read)
     has_turning = any(_TURNING.search(document.raw) for document in read)
@@ -113,11 +114,12 @@ def read(
             if reading == MOST_READINGS - 1:
                 unfollowed = _nothing_followed(surveyed)
     _report_structure(run)
+    _report_forms(run)
     marker_at = _marker_at(source, code)
     toolpath, text, refusals = to_toolpath(run, places)
-    bases = [toolpath.frames[index] for index in np.unique(toolpath.base).tolist() if index >= 0]
-    unresolved = _unresolved(run, bases)
-    _report_siblings(run, references, siblings, bases)
+    entries = _frames_used(toolpath)
+    unresolved = _unresolved(run, entries)
+    _report_siblings(run, references, siblings, entries)
     findings = sorted([*run.findings, *refusals], key=lambda finding: (finding.line, finding.column))
     return Program(
         dialect="krl",
@@ -139,38 +141,50 @@ def _directions(code: Sequence[Item]) -> Iterator[tuple[bytes, tuple[bool, ...]]
             yield item.strings.name, tuple(back for _, back in item.strings.parameters)
 
 
-def _unresolved(run: ExecutionContext, bases: Sequence[FrameRef]) -> frozenset[str]:
-    """Names that the program asks for and no file that was read declares; routines with ().  bases: those that the
-    motions have."""
+def _frames_used(toolpath: Toolpath) -> dict[str, FrameRef]:
+    """The entries of BASE_DATA and TOOL_DATA that motions have and whose pose the program does not state."""
+    found = {}
+    for table, used in ((b"BASE", toolpath.base), (b"TOOL", toolpath.tool)):
+        for index in np.unique(used).tolist():
+            frame = toolpath.frames[index] if index >= 0 else None
+            if frame is not None and frame.number and frame.pose is None:
+                found[entry_of(table, frame.number)] = frame
+    return found
+
+
+def _unresolved(run: ExecutionContext, entries: Mapping[str, FrameRef]) -> frozenset[str]:
+    """Names that the program asks for and no file that was read declares; routines with ().  entries: of BASE_DATA and
+    TOOL_DATA that motions have."""
     known = {*FRAME_TABLES, *run.declarations.types, *run.declarations.values, *run.declarations.records}
     known |= {name for routine in run.survey.routine_at.values() for name in routine.types}
     names = {name for name in run.variables.asked - known if not name.startswith(b"$")}
     calls = run.unread | {name for of in run.others.unread.values() for name in of}
-    entries = (f"BASE_DATA[{one.number}]" for one in bases if one.number and not (one.pose or one.declared))
-    return frozenset([*map(shown, names), *(f"{shown(name)}()" for name in calls), *entries])
+    unknown = (entry for entry, frame in entries.items() if frame.declared is None)
+    return frozenset([*map(shown, names), *(f"{shown(name)}()" for name in calls), *unknown])
 
 
 def _report_siblings(
     run: ExecutionContext,
     references: Sequence[Document],
     siblings: Sequence[Document],
-    bases: Sequence[FrameRef],
+    entries: Mapping[str, FrameRef],
 ) -> None:
     """Says which files beside the program are read, and for what; of ``references``, which the user names, for which
-    bases."""
+    ``entries`` of BASE_DATA and TOOL_DATA."""
     used: dict[str, list[str]] = {}
     for name in sorted(run.variables.asked & run.declarations.origin.keys() - set(FRAME_TABLES)):
         used.setdefault(run.declarations.origin[name], []).append(shown(name))
     for name, (module, _) in sorted(run.others.routines.items()):
         used.setdefault(module.document.path.name, []).append(f"{shown(name)}()")
-    entries: dict[str, list[str]] = {}
-    for base in bases:
-        if base.declared is not None and base.number is not None:
-            file = run.declarations.bases[base.number][1]
-            entries.setdefault(file, []).append(f"BASE_DATA[{base.number}] (where the cell has no such base)")
+    frames: dict[str, list[str]] = {}
+    for entry, frame in entries.items():
+        if frame.declared is not None:
+            word = "tool" if entry.startswith("TOOL") else "base"
+            file = run.declarations.frames[entry][1]
+            frames.setdefault(file, []).append(f"{entry} (where the cell has no such {word})")
     for document in (*references, *siblings):
         names = [*(used.get(document.path.name, ()) if document in siblings else ())]
-        names += entries.get(document.path.name, ())
+        names += frames.get(document.path.name, ())
         if names:
             more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
             message = f"{document.path} is read for {', '.join(names[:MOST_NAMES])}{more}"
@@ -214,6 +228,16 @@ def _report_structure(run: ExecutionContext) -> None:
     if not run.survey.has_routine:
         first = next((n for n, a, b in lines(run.document) if run.document.raw[a:b].strip()), 1)
         run.findings.append(Finding("KRL018", "the file has no DEF", name, first, 1))
+
+
+def _report_forms(run: ExecutionContext) -> None:
+    """Reports statements with words that have no meaning there, but those that are rows, refused as motions."""
+    chunks = (chunk for chunk in run.rows.chunks if isinstance(chunk, list))
+    rows = {row.line for chunk in chunks for row in chunk if row.kind == Kind.OTHER}
+    for item in run.code:
+        if isinstance(item, Statement) and item.line not in rows and not is_well_formed(item):
+            message = f"'{shown(item.code)}' is not understood; what it does is not known"
+            run.add_finding("KRL034", message, item)
 
 
 def _marker(raw: bytes) -> Span | None:

@@ -66,13 +66,15 @@ _ASSIGNMENT = re.compile(
     rb"((?:\.[ \t]*+" + NAME + rb"(?:\[[^\]]*+\])?[ \t]*+)*+)=(?!=)[ \t]*+"
 )
 _CALL = re.compile(rb"(" + NAME + rb")[ \t]*\((.*)\)\Z", re.S)
-_DECLARED = re.compile(
+DECLARED = re.compile(
     rb"(?:GLOBAL[ \t]+)?(?:DECL[ \t]+)?(GLOBAL[ \t]+)?(CONST[ \t]+)?(" + NAME + rb")[ \t]+(?=[A-Za-z_$])",
     re.I,
 )
 _ITEM = re.compile(rb"(" + NAME + rb")[ \t]*(?:\[([^\]]*)\])?[ \t]*(=[ \t]*)?")
 _STRING = re.compile(rb'"[^"\r\n]*"?')
 _BRACKET = re.compile(rb'"[^"\r\n]*"?|[{}()\[\],]')
+_FLAT = re.compile(rb'(?:[^"{}()\[\],]|"[^"\r\n]*+"|\{(?:[^"{}()\[\]]|"[^"\r\n]*+"|\[\])*+\})*+(?=,|\Z)')
+"""A value without brackets but those of a plain aggregate."""
 _BLANKS = re.compile(rb"[ \t]*")
 _IDENTIFIER = re.compile(rb"(?<![A-Za-z0-9_$#'])" + NAME)
 _NUMBER = re.compile(rb"[-+]?[ \t]*+(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d{1,4})?\Z")
@@ -309,7 +311,7 @@ def assignment(code: bytes, at: int) -> Assignment | None:
 
 def declaration(code: bytes, at: int) -> Declared | None:
     """``[DECL] [GLOBAL] TYPE NAME[[n]] [= value] {, ...}``; None if the code is none."""
-    head = _DECLARED.match(code)
+    head = DECLARED.match(code)
     if head is None or head[3].upper() in (b"INTERRUPT", b"DECL"):
         return None
     is_global = head[1] is not None or code[:6].upper() == b"GLOBAL"
@@ -340,6 +342,8 @@ def _skip(code: bytes, place: int) -> int:
 
 def value_end(code: bytes, start: int) -> int:
     """Where a value that starts at ``start`` ends: at the comma outside of all braces, or at the end."""
+    if plain := _FLAT.match(code, start):
+        return plain.end()
     depth = 0
     for found in _BRACKET.finditer(code, start):
         letter = found[0]

@@ -13,6 +13,7 @@ from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
 from postproc.languages.krl.external_axes import ALL_LOST, UNSTATED, six
 from postproc.languages.krl.spatial import Numbers
+from postproc.languages.krl.statement_effects import Effect
 from postproc.languages.krl.target import Six, UnknownValue
 from postproc.toolpath import LOST, ArcFrame, FrameRef, OrientationMode
 
@@ -27,6 +28,9 @@ START, ELSEWHERE = -1, -2
 
 Record = dict[bytes, bytes]
 """FDAT, LDAT or PDAT: key -> value, upper case."""
+
+
+TRIGGERED = "a TRIGGER before it refers to it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,9 +105,10 @@ class ModalState:
     feed [m/s], blend [mm] ($APO.CDIS): NaN where not known; point: X..C of the last end point [mm, deg], stated in
     ``point_frames``, by the motion in ``point_line``; axes [deg]: those of the last end point, where it was
     programmed so; form: the inline form that was entered last; external [mm, deg]: E1..E6; external_apart: what the
-    program has set so that motions do not take them along; triggered: a TRIGGER is between the last motion and here;
-    root_set: the line, if any, from which on the program itself states where the robot is in the world; later_since:
-    the line, if any, from which on an interrupt or a trigger may change base or tool.
+    program has set so that motions do not take them along; no_insert: why nothing can be inserted before the next
+    motion, "" where it can; root_set: the line, if any, from which on the program itself states where the robot is in
+    the world; later_since: the line, if any, from which on an interrupt or a trigger may change base or tool;
+    later_speed: which of "feed" and "apo" one may change.
     """
 
     base: FrameIndex | UnknownValue = NO_BASE
@@ -126,9 +131,20 @@ class ModalState:
     arc_frame: int = ArcFrame.BASE
     external: Numbers = UNSTATED
     external_apart: frozenset[bytes] = frozenset()
-    triggered: bool = False
+    no_insert: str = ""
     root_set: int = 0
     later_since: int = 0
+    later_speed: frozenset[Effect] = frozenset()
+
+    @property
+    def steady_feed(self) -> float:
+        """[m/s] the feed that no interrupt or trigger changes; NaN where one may, or where it is not known."""
+        return NAN if "feed" in self.later_speed else self.feed
+
+    @property
+    def steady_blend(self) -> float:
+        """[mm] the same of $APO.CDIS."""
+        return NAN if "apo" in self.later_speed else self.blend
 
     def copy(self) -> ModalState:
         other = object.__new__(ModalState)
@@ -257,8 +273,9 @@ _JOINS: dict[str, Callable[[Any, Any], object]] = {
     "arc_frame": lambda one, other: ArcFrame.UNKNOWN,
     "external": lambda one, other: six([a if _same(a, b) else LOST for a, b in zip(one, other, strict=True)]),
     "external_apart": frozenset.union,
-    "triggered": _either,
+    "no_insert": _either,
     "root_set": _either,
     "later_since": _either,
+    "later_speed": frozenset.union,
     "point_line": lambda one, other: one,
 }

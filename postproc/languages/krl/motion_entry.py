@@ -99,7 +99,7 @@ def enter_motion(
     row = rows.add(
         MotionRow(
             kind, statement.line, extent(statement, operand), values or NAN6, axes or NAN6,
-            NAN if kind in (Kind.PTP, Kind.AXIS) else state.feed, index(state.base), index(state.tool), blend,
+            NAN if kind in (Kind.PTP, Kind.AXIS) else state.steady_feed, index(state.base), index(state.tool), blend,
             stated, _inherits(stated, relative), path_of(way) if values is not None else NO_ARC,
             state.orientation, state.arc_frame, external,
         ),
@@ -114,11 +114,11 @@ def enter_motion(
     if kind == Kind.SPL or run.spline is not None:
         rows.whole[row] = "it is part of a spline"
         _in_block(run, row)
-    elif state.triggered:
-        rows.whole[row] = "a TRIGGER before it refers to it"
+    elif state.no_insert:
+        rows.whole[row] = state.no_insert
     elif statement.line in run.survey.inline and not _in_form(run, row):
         rows.whole[row] = "it is an inline form that sets another base or tool"
-    state.triggered = False
+    state.no_insert = ""
     if partial or relative or operand.builds:
         rows.builds_on[row] = state.sources
     _advance(state, statement.line, _reached(state, kind, values), axes, reason)

@@ -122,7 +122,13 @@ class MotionRows:
         frames = index(state.base), index(state.tool)
         self.chunks.append(
             VectorisedLot(
-                bulk, state.feed, *frames, state.blend, external, state.orientation, state.arc_frame
+                bulk,
+                state.steady_feed,
+                *frames,
+                state.steady_blend,
+                external,
+                state.orientation,
+                state.arc_frame,
             )
         )
         self.count += len(bulk)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,9 +15,17 @@ from postproc.base.units import DEG, MM
 from postproc.languages.krl.external_axes import UNSTATED, six
 from postproc.languages.krl.motion_rows import NAN, NAN6, NO_ARC, MotionRow, MotionRows
 from postproc.languages.krl.spatial import Numbers
-from postproc.languages.krl.target import NOWHERE
+from postproc.languages.krl.target import KrlTarget
 from postproc.languages.krl.vectorised import VectorisedLines
 from postproc.toolpath import Kind
+
+NOTHING = KrlTarget((None,) * 6)
+"""Of a motion without a readable target."""
+
+
+def _columns(entry: type[tuple[Any, ...]], rows: Sequence[Any]) -> Any:
+    """The entries of named tuples as one of columns."""
+    return entry(*zip(*rows, strict=True))
 
 
 class Spots:
@@ -39,14 +50,12 @@ class Spots:
 
     def take(self, part: slice, rows: list[MotionRow]) -> None:
         """Rows that were read alone."""
-        targets = [row.target for row in rows]
-        self.motion[part] = [row.motion for row in rows]
-        self.inherits[part] = [row.inherits for row in rows]
-        self.start[part] = [NOWHERE if t is None else t.start for t in targets]
-        self.stop[part] = [NOWHERE if t is None else t.stop for t in targets]
-        self.file[part] = [NOWHERE if t is None else t.file for t in targets]
-        self.insert[part] = [-1 if t is None else t.insert for t in targets]
-        self.home[part] = [-1 if t is None else t.home for t in targets]
+        columns = _columns(MotionRow, rows)
+        targets = _columns(KrlTarget, [target or NOTHING for target in columns.target])
+        self.motion[part] = columns.motion
+        self.inherits[part] = columns.inherits
+        self.start[part], self.stop[part], self.file[part] = targets.start, targets.stop, targets.file
+        self.insert[part], self.home[part] = targets.insert, targets.home
 
 
 def _first(rows: MotionRows) -> Numbers:
@@ -132,19 +141,18 @@ class MotionTable:
     def _fill(self, at: int, rows: list[MotionRow]) -> None:
         part = slice(at, at + len(rows))
         self.loose += zip(range(at, at + len(rows)), rows, strict=True)
-        self._place(part, np.array([row.values for row in rows]))
-        states = [(-1, -1) if row.target is None else (row.target.status, row.target.turn) for row in rows]
+        columns = _columns(MotionRow, rows)
+        self._place(part, np.array(columns.values))
+        states = [(-1, -1) if t is None else (t.status, t.turn) for t in columns.target]
         self._state(part, *np.array(states, np.int32).T)
-        self._external(part, np.array([row.external for row in rows]))
-        self.kind[part] = [row.kind for row in rows]
-        self.line[part] = [row.line for row in rows]
-        self.base[part] = [row.base for row in rows]
-        self.tool[part] = [row.tool for row in rows]
-        self.feed[part] = [row.feed for row in rows]
-        self.blend[part] = [row.blend for row in rows]
-        self.word[part] = [row.motion[0] for row in rows]
-        self.orientation[part] = [row.orientation for row in rows]
-        self.arc_frame[part] = [row.arc_frame for row in rows]
+        self._external(part, np.array(columns.external))
+        for array, column in (
+            (self.kind, columns.kind), (self.line, columns.line), (self.base, columns.base),
+            (self.tool, columns.tool), (self.feed, columns.feed), (self.blend, columns.blend),
+            (self.orientation, columns.orientation), (self.arc_frame, columns.arc_frame),
+        ):  # fmt: skip
+            array[part] = column
+        self.word[part] = [places[0] for places in columns.motion]
         if self.spots is not None:
             self.spots.take(part, rows)
         for i, row in enumerate(rows):

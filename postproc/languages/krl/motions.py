@@ -56,6 +56,9 @@ def move_bulk(run: ExecutionContext, bulk: VectorisedLines) -> None:
     state = run.state
     reason = structure_refusal(run) or frames_missing(run)
     run.rows.note_sources(state.sources)
+    if state.no_insert:
+        run.rows.whole[len(run.rows)] = state.no_insert
+        state.no_insert = ""
     last = run.rows.add_bulk(bulk, state, reason)
     if (turns := orientation_refusal(state, Kind.LIN)) is not None:
         for row in (last + 1 - len(bulk) + np.flatnonzero(bulk.is_line)).tolist():
@@ -105,6 +108,9 @@ def _move(run: ExecutionContext, statement: Statement, parts: Parts, reason: Row
         return
     if parts.not_understood:
         reason = reason or RowRefusal("KRL001", f"'{shown(parts.not_understood)}' is not understood")
+    if parts.reference is not None and not relative:
+        reference = code[slice(*parts.reference)]
+        reason = reason or RowRefusal("KRL001", f"'{shown(reference)}' is not understood")
     if kind == Kind.CIRC:
         move_on_arc(run, statement, parts, first, reason, blend)
         return
@@ -132,4 +138,4 @@ def _blend(state: ModalState, parts: Parts) -> float:
     """[mm] that the controller may leave the path before the end point."""
     if not parts.approximations:
         return 0.0
-    return state.blend if set(parts.approximations) == {b"C_DIS"} else NAN
+    return state.steady_blend if set(parts.approximations) == {b"C_DIS"} else NAN

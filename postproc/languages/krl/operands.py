@@ -12,7 +12,7 @@ from postproc.languages.krl.expressions import index_text
 from postproc.languages.krl.lexing import NAME, identifiers
 from postproc.languages.krl.source_map import PointVariable
 from postproc.languages.krl.statement_effects import HERE, READS_POSITION
-from postproc.languages.krl.target import KrlTarget, UnknownValue, parse, shown
+from postproc.languages.krl.target import KrlTarget, UnknownValue, parse, plain, shown
 
 _NAMED = re.compile(
     rb"(" + NAME + rb")[ \t]*(?:\[((?:[^\[\]]|\[[^\[\]]*\])*)\])?((?:[ \t]*\.[ \t]*" + NAME + rb")*)[ \t]*"
@@ -23,6 +23,10 @@ _MARK = re.compile(
     re.I,
 )
 _LAST_SLUR = re.compile(rb"[ \t,]C_(DIS|VEL|ORI|PTP|SPL)[ \t]*\Z", re.I)
+_SLUR = rb"[ \t]*+C_(?:DIS|VEL|ORI|PTP|SPL)(?![A-Za-z0-9_$])"
+_POINT = rb"[ \t]*+(\{[^{}()\[\]\"]*+\}|(?!WITH(?![A-Za-z0-9_$])|" + _SLUR + rb")[A-Za-z_$][A-Za-z0-9_$]*+)"
+_COMMON = re.compile(_POINT + rb"(?:[ \t]*+," + _POINT + rb")?+((?:" + _SLUR + rb")*+)[ \t]*+\Z", re.I)
+"""One or two targets without brackets of their own, and approximations: most of the motions."""
 _HOME = re.compile(rb"X?HOME[1-5]?\Z")
 
 
@@ -54,6 +58,9 @@ class Operand(NamedTuple):
 @lru_cache(maxsize=4096)
 def take_apart(code: bytes, start: int) -> Parts:
     """The parts of a motion statement, whose word ends at ``start``."""
+    if common := _COMMON.match(code, start):
+        places = (common.span(1),) if common[2] is None else (common.span(1), common.span(2))
+        return Parts(places, tuple(common[3].upper().split()))
     points: list[tuple[int, int]] = []
     approximations: list[bytes] = []
     reference: tuple[int, int] | None = None
@@ -79,13 +86,17 @@ def take_apart(code: bytes, start: int) -> Parts:
             points.append((left, left + len(inner)))
         elif inner:
             odd = odd or inner
+        elif is_open and (at != start or token == b","):
+            odd = odd or b","
         if mark is None:
             break
         is_open, at = token == b",", mark.end()
         if token.startswith(b"#"):
+            odd = odd or (b"" if reference is None else token)
             reference = mark.span()
         elif token.upper() == b"WITH":
             clause = code[at:]
+            odd = odd or (b"" if clause.strip() else token)
             found = _LAST_SLUR.search(clause)
             if found:
                 approximations.append(b"C_" + found[1].upper())
@@ -99,8 +110,10 @@ def take_apart(code: bytes, start: int) -> Parts:
 def operand_at(run: ExecutionContext, code: bytes, at: int, place: tuple[int, int]) -> Operand:
     """The target that is at ``place`` of the code, which starts at byte ``at``."""
     start, stop = place
-    text = code[start:stop]
     begin, end = at + start, at + stop
+    if (literal := plain(run.document.raw, begin, end, 0)) is not None:
+        return Operand(literal, begin, end)
+    text = code[start:stop]
     if text.startswith(b"{"):
         close = text.find(b"}")
         if close == len(text) - 1 and b"{" not in text[1:]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -25,7 +25,6 @@ from postproc.languages.krl.variables import Variables
 from postproc.languages.krl.vectorised import Item
 from postproc.toolpath.initial_state import Symbol
 
-_ROOT = re.compile(rb"\$(?:ROBROOT|WORLD)[ \t]*+(?:\.[ \t]*+[A-Z][ \t]*+)?=(?!=)", re.I)
 _APART = re.compile(rb"\$(?:EX_AX_IGNORE|ASYNC_AXIS)[ \t]*+=|\bASY(?:PTP|CONT)\b", re.I)
 MOST_DEPTH = 5
 """Calls of modules inside of one another that are followed."""
@@ -48,14 +47,12 @@ MODAL_FIELDS = (
 
 @dataclass(eq=False)
 class OtherModule:
-    """A module that is read and never written; sets_root: it states where the robot is in the world; apart: it takes
-    external axes out of the motions."""
+    """A module that is read and never written; apart: it takes external axes out of the motions."""
 
     document: Document
     code: list[Item]
     survey: ProgramStructure
     declarations: Declarations
-    sets_root: bool
     apart: bool
 
     @cached_property
@@ -63,6 +60,12 @@ class OtherModule:
         """Whether its routines end where their text says."""
         words = {one.word for one in self.code if isinstance(one, Statement)}
         return not self.survey.unclosed and b"RESUME" not in words
+
+    @cached_property
+    def shared_later(self) -> set[bytes]:
+        """Variables that other modules know, and that its interrupts and triggers change."""
+        own = self.declarations.types.keys() - self.declarations.shared
+        return self.survey.later - self.survey.routines.keys() - own
 
     @cached_property
     def has_trigger(self) -> bool:
@@ -92,12 +95,15 @@ class OtherModules:
     outcomes: dict[tuple[bytes, str], tuple[ModalState, FrameRegister] | None] = field(default_factory=dict)
     steps: int = 0
 
-    def share(self, survey: ProgramStructure) -> None:
-        """Takes up what the program changes: to the modules, and to it what they change."""
+    def share(self, survey: ProgramStructure, own: Set[bytes]) -> None:
+        """Takes up what the program changes: to the modules, and to it what they change, but for its ``own`` names."""
         self.assigned |= survey.assigned
         survey.table_entries |= self.table_entries
+        later = survey.later.union(*(module.shared_later for module, _ in self.routines.values()))
+        survey.later |= later - own
         for module, _ in self.routines.values():
             module.survey.table_entries |= survey.table_entries
+            module.survey.later |= later - module.declarations.types.keys() | module.shared_later
 
     def directions(self) -> dict[bytes, tuple[bool, ...]]:
         """Name of a routine -> of each parameter whether it comes back changed."""
@@ -154,10 +160,8 @@ def _module(
     bind_symbols(declarations, symbols, own)
     code = list(scan(document, True))
     statements = ((i, one if isinstance(one, Statement) else _MOTION) for i, one in enumerate(code))
-    apart, root = _APART.search(document.raw), _ROOT.search(document.raw)
-    return OtherModule(
-        document, code, program_structure(statements), declarations, root is not None, apart is not None
-    )
+    apart = _APART.search(document.raw) is not None
+    return OtherModule(document, code, program_structure(statements), declarations, apart)
 
 
 def _settle(found: OtherModules, name: bytes) -> None:

@@ -42,20 +42,36 @@ def continuous(rows: MotionRows, single: Bools) -> Bools:
 def predecessors(rows: MotionRows, continues: Bools) -> dict[int, tuple[int, ...]]:
     """Row that does not continue the one before it (``continues`` (N,)) -> where it may start, as of a Toolpath."""
     found: dict[int, tuple[int, ...]] = {}
+    many: set[Source] = set()
     for row in np.flatnonzero(~continues).tolist():
         if rows.never_from is not None and row >= rows.never_from:
             continue
         sources = rows.sources_of.get(row)
-        known = {row - 1} if sources is None else _few(rows, sources)
+        known = {row - 1} if sources is None else _few(rows, sources, many)
         found[row] = tuple(sorted(known)) or (ELSEWHERE,)
     return found
 
 
-def _few(rows: MotionRows, sources: Iterable[Source]) -> set[int]:
-    """The rows behind sources, none where they are more than ``MOST``."""
+def _few(rows: MotionRows, sources: frozenset[Source], many: set[Source]) -> set[int]:
+    """The rows behind sources, none where they are more than ``MOST``; many: marks that stand for so many, to which
+    those are added that are found to."""
     seen: set[Source] = set()
-    found = expanded(rows, sources, seen, MOST)
-    return set() if len(found) > MOST or len(seen) > _MARKS else found
+    found: set[int] = set()
+    todo = list(sources)
+    while todo:
+        source = todo.pop()
+        if source in seen:
+            continue
+        seen.add(source)
+        if isinstance(source, int):
+            found.add(source)
+        else:
+            todo.extend(rows.sources[source])
+        if source in many or len(found) > MOST or len(seen) > _MARKS:
+            if len(sources) == 1:
+                many |= sources
+            return set()
+    return found
 
 
 def _sources_of_others(rows: MotionRows, single: Bools) -> Iterable[Source]:
@@ -64,11 +80,9 @@ def _sources_of_others(rows: MotionRows, single: Bools) -> Iterable[Source]:
     return others | rows.left_from
 
 
-def expanded(
-    rows: MotionRows, sources: Iterable[Source], seen: set[Source] | None = None, most: int | None = None
-) -> set[int]:
+def expanded(rows: MotionRows, sources: Iterable[Source], seen: set[Source] | None = None) -> set[int]:
     """The rows (and ``START``, ``ELSEWHERE``) among sources, with those behind marks; without what ``seen`` has, which
-    takes up all that is found.  ``most``: the search ends when it has found more, or more than ``_MARKS`` marks."""
+    takes up all that is found."""
     seen = set() if seen is None else seen
     found: set[int] = set()
     todo = list(sources)
@@ -81,8 +95,6 @@ def expanded(
             found.add(source)
         else:
             todo.extend(rows.sources[source])
-        if most is not None and (len(found) > most or len(seen) > _MARKS):
-            break
     return found
 
 

@@ -21,7 +21,13 @@ from postproc.languages.krl.lexing import (
     has_foreign_letters,
     identifiers,
 )
-from postproc.languages.krl.modal_state import ELSEWHERE, FrameRegister, InlineFormState, ModalState
+from postproc.languages.krl.modal_state import (
+    ELSEWHERE,
+    TRIGGERED,
+    FrameRegister,
+    InlineFormState,
+    ModalState,
+)
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.open_blocks import BUDGET
 from postproc.languages.krl.other_modules import (
@@ -126,6 +132,7 @@ class ProgramFlow(Calls):
         run.rows.sources[mark].add(ELSEWHERE)
         run.state = ModalState(sources=frozenset([mark]))
         run.state.root_set, run.state.later_since = run.root_set, run.later_since
+        run.state.later_speed = run.later_speed
         run.walked = True
         run.forget(EVERYTHING - {"all"}, f"at the start of the subprogram of line {routine.line}")
         run.routine = routine
@@ -147,14 +154,20 @@ class ProgramFlow(Calls):
                 bulks.add(id(chunk.bulk))
         run.idle, run.rows.never_from = True, len(run.rows)
         for item in run.code:
-            run.state, run.routine = ModalState(sources=frozenset([ELSEWHERE])), None
             if isinstance(item, VectorisedLines):
                 if id(item) not in bulks:
+                    self._anywhere()
                     motions.move_bulk(run, item)
             elif item.kind == "motion" and item.line not in lines:
+                self._anywhere()
                 motions.move(run, item)
             elif item.kind == "strange" and item.line not in lines and run.survey.has_routine:
+                self._anywhere()
                 motions.unknown_motion(run, item)
+
+    def _anywhere(self) -> None:
+        """Nothing is known."""
+        self.run.state, self.run.routine = ModalState(sources=frozenset([ELSEWHERE])), None
 
     def _step(self, pc: int) -> int | None:
         """Takes up a statement; gives the index of the next one, None after the end."""
@@ -186,7 +199,8 @@ class ProgramFlow(Calls):
         if not item.code.isascii() and kind != "motion" and has_foreign_letters(item.code):
             self._report_letters(item)
         run.variables.line = item.line
-        self._call_functions(item)
+        if b"(" in item.code:
+            self._call_functions(item)
         if pc in run.survey.events:
             there = self._block_event(pc, item)
             if there is not None or not self.reachable:
@@ -222,7 +236,8 @@ class ProgramFlow(Calls):
         elif kind == "other" and run.survey.has_routine and HIDDEN.search(item.code):
             motions.unknown_motion(run, item)
         elif item.word in (b"TRIGGER", b"INTERRUPT", b"GLOBAL"):
-            run.state.triggered = run.state.triggered or item.word == b"TRIGGER"
+            if item.word == b"TRIGGER":
+                run.state.no_insert = TRIGGERED
             self._later(item)
         return pc + 1
 
@@ -267,10 +282,8 @@ class ProgramFlow(Calls):
     def _later(self, item: Statement) -> None:
         """Takes up what an interrupt or a trigger may do from here on."""
         run = self.run
-        if not run.survey.later_effects.isdisjoint(("base", "tool", "mode", "turning")):
-            run.state.later_since = run.state.later_since or item.line
-            run.later_since = run.later_since or item.line
-        for name in LATER.findall(item.code):
+        run.expect_later(run.survey.later_effects, item.line)
+        for name, _ in LATER.findall(item.code):
             name = name.upper()
             if name + b"(" in item.code.upper().replace(b" ", b"") and name not in run.survey.routines:
                 self._unread(item, name)

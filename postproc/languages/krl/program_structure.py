@@ -14,6 +14,7 @@ from postproc.languages.krl.lexing import (
     LOOPS,
     NAME,
     Assignment,
+    Call,
     Declared,
     Head,
     Statement,
@@ -31,6 +32,7 @@ from postproc.languages.krl.statement_effects import (
     functions_of,
     is_harmless,
     read_by,
+    returned_by,
 )
 
 NO_EFFECTS: Mapping[bytes, Effects] = MappingProxyType({})
@@ -47,7 +49,8 @@ DEEPEST = 100
 
 INLINE = re.compile(rb";[ \t]*FOLD[ \t]+(?:S?(?:PTP|LIN|CIRC)|SPL)(?![A-Za-z0-9_])", re.I)
 _FOLD = re.compile(rb";[ \t]*(END)?FOLD(?![A-Za-z0-9_])", re.I)
-LATER = re.compile(rb"\bDO[ \t]+(" + NAME + rb")", re.I)
+LATER = re.compile(rb"\bDO[ \t]+(" + NAME + rb")(?:[ \t]*+\((.*)\))?", re.I)
+"""The routine that runs, or the variable that is assigned, at a time of its own; and what is handed to it."""
 
 
 @dataclass(eq=False)
@@ -292,7 +295,9 @@ class _Surveyor:
                     self.routine.types[key.split(b"[")[0]] = said.type
         found.read |= read_by(statement)
         if statement.word in (b"INTERRUPT", b"TRIGGER", b"GLOBAL"):
-            found.later.update(name.upper() for name in LATER.findall(statement.code))
+            for name, given in LATER.findall(statement.code):
+                call = Call(name.upper(), given)
+                found.later |= {call.name, *returned_by(call, found.directions)}
         if stack:
             _join(stack[-1].effects, effects)
             stack[-1].calls.update(functions)

@@ -1,7 +1,7 @@
 """What a statement changes, reads and calls.
 
-An effect is a word ("point", "base", "tool", "feed", "apo", "mode", "turning", "record", "all" for every variable that
-the program assigns) or the name (bytes) of a variable that is assigned.
+An effect is a word ("point", "base", "tool", "feed", "apo", "mode", "turning", "root", "record", "all" for every
+variable that the program assigns) or the name (bytes) of a variable that is assigned.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ HARMLESS = frozenset(
     b"ABS SIN COS TAN ACOS ATAN ATAN2 SQRT FRAND FORWARD INVERSE INV_POS EK EB EO LK TOOL_ADJ VARTYPE GETVARSIZE "
     b"STRCOMP STRFIND STRLEN STRDECLLEN STRTOBOOL STRTOINT STRTOREAL STRTOSTRING STRTOFRAME STRTOPOS STRTOE3POS "
     b"STRTOE6POS STRTOAXIS STRTOE3AXIS STRTOE6AXIS GET_SIG_INF GETSYSSTATE GETCYCDEF GET_DECL_PLACE GET_MSGBUFFER "
-    b"SVEL_CP SVEL_JOINT STOOL2 SBASE SIPO_MODE SLOAD SACC_CP SACC_JOINT SORI_TYP SAPO SAPO_PTP SJERK SGEAR_JERK "
+    b"SVEL_CP SVEL_JOINT STOOL STOOL2 SBASE SIPO_MODE SLOAD SACC_CP SACC_JOINT SORI_TYP SAPO SAPO_PTP SJERK SGEAR_JERK "
     b"SCIRC_TYP IS_KEY_PRESSED TIMER_LIMIT ISMESSAGESET SET_KRLMSG EXISTS_KRLMSG CLEAR_KRLMSG SET_KRLDLG "
     b"EXISTS_KRLDLG".split()
 )
@@ -99,6 +99,8 @@ SYSTEM: dict[bytes, str] = {
     b"$ORI_TYPE": "turning",
     b"$CIRC_TYPE": "turning",
     b"$CIRC_MODE": "turning",
+    b"$ROBROOT": "root",
+    b"$WORLD": "root",
     b"FDAT_ACT": "record",
     b"LDAT_ACT": "record",
     b"PDAT_ACT": "record",

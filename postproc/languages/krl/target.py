@@ -13,19 +13,41 @@ from postproc.languages.krl.spatial import Numbers
 
 Six = tuple[float | None, float | None, float | None, float | None, float | None, float | None]
 NOWHERE = (-1,) * 6
+_NONE: Six = (None,) * 6
 NAN = float("nan")
 
 COMPONENTS = {b"X": 0, b"Y": 1, b"Z": 2, b"A": 3, b"B": 4, b"C": 5}
 AXES = {b"A1": 0, b"A2": 1, b"A3": 2, b"A4": 3, b"A5": 4, b"A6": 5}
 EXTERNAL = frozenset([b"E1", b"E2", b"E3", b"E4", b"E5", b"E6"])
 _STATES = (b"S", b"T")
+_CARTESIAN = 6
 _TAGS = frozenset([b"FRAME", b"POS", b"E3POS", b"E6POS", b"AXIS", b"E3AXIS", b"E6AXIS"])
 
 _TAG = re.compile(rb"[ \t]*(" + NAME + rb")[ \t]*:[ \t]*")
 _KEY = re.compile(rb"[ \t]*(" + NAME + rb")((?:[ \t]*\[[^\],]*\])?)[ \t]*")
 
-SHORT = 40
-"""Bytes of an aggregate that is kept as it was read: programs of many short lines repeat them."""
+_END = rb"[ \t]*+(?:,(?![ \t]*+\})[ \t]*+|(?=\}))"
+_REAL = rb"[ \t]++([-+]?\d{1,15}+(?:\.\d{0,20}+)?+(?:E[-+]?\d{1,2}+)?+)" + _END
+_BITS = rb"(?=[ \t'])[ \t]*+(\d{1,9}+|'B[01]{1,30}+')" + _END
+_EXTERNALS = b"".join(rb"(?:E%d%s)?+" % (i, _REAL) for i in range(1, 7))
+_TAGGED = rb"\{[ \t]*+(?:(?:%s)[ \t]*+:[ \t]*+)?+"
+_PLAIN = re.compile(
+    _TAGGED % rb"FRAME|(?:E[36])?POS"
+    + b"".join(rb"(?:%s%s)?+" % (key, _REAL) for key in COMPONENTS)
+    + b"".join(rb"(?:%s%s)?+" % (key, _BITS) for key in _STATES)
+    + _EXTERNALS
+    + rb"\}\Z",
+    re.I,
+)
+_PLAIN_AXES = re.compile(
+    _TAGGED % rb"(?:E[36])?AXIS"
+    + rb"(?=(A))"
+    + b"".join(rb"(?:%s%s)?+" % (key, _REAL) for key in AXES)
+    + _EXTERNALS
+    + rb"\}\Z",
+    re.I,
+)
+"""Literals in their usual order, as most aggregates are."""
 
 External = tuple[tuple[bytes, float | None, bytes], ...]
 Evaluate = Callable[[bytes], Any]
@@ -106,26 +128,6 @@ class KrlTarget(NamedTuple):
             unknown=self.unknown,
         )
 
-    def moved(self, by: int, file: int) -> KrlTarget:
-        """The same target so many bytes further on in another document; it has places and no reason."""
-        start, stop, of = self.start, self.stop, self.file
-        if start != NOWHERE:
-            start = tuple([at + by if at >= 0 else at for at in start])
-            stop = tuple([at + by if at >= 0 else at for at in stop])
-            of = tuple([file if at >= 0 else at for at in of])
-        return KrlTarget(
-            self.values,
-            start,
-            stop,
-            of,
-            self.axes,
-            self.status,
-            self.turn,
-            self.insert + by,
-            file,
-            self.external,
-        )
-
     def component(self, key: bytes) -> float | None:
         """The number of a component, None where it has none."""
         if key in COMPONENTS and self.axes is None:
@@ -188,18 +190,50 @@ def parse(text: bytes, at: int, file: int, evaluate: Evaluate | None = None) -> 
 
     A component that is no literal is given to ``evaluate``; its place is then unknown.
     """
-    found = _literal(text) if len(text) <= SHORT else None
+    found = plain(text, 0, len(text), file)
     if found is None:
         return _parse(text, at, file, evaluate)
-    return found.moved(at, file) if isinstance(found, KrlTarget) else found
+    start, stop = (
+        tuple([place + at if place >= 0 else -1 for place in places]) for places in (found.start, found.stop)
+    )
+    return found._replace(start=start, stop=stop, insert=found.insert + at)
 
 
-@lru_cache(maxsize=1024)
-def _literal(text: bytes) -> KrlTarget | UnknownValue | None:
-    """The target in ``text`` at byte 0 of document 0; None where a component is no literal."""
-    others: list[bytes] = []
-    found = _parse(text, 0, 0, others.append)
-    return None if others else found
+def plain(raw: bytes, begin: int, end: int, file: int) -> KrlTarget | None:
+    """The target in bytes ``begin`` to ``end`` of document ``file``, where all are literals in their usual order, one
+    of X .. C or A1 .. A6 among them; else None."""
+    found = _PLAIN.match(raw, begin, end)
+    if found is None:
+        return _plain_axes(raw, begin, end, file)
+    start, stop = zip(*found.regs[1:7], strict=True)
+    insert = max(stop)
+    if insert < 0:
+        return None
+    given = found.groups()
+    files: tuple[int, ...] = NOWHERE
+    if file >= 0:
+        files = (file,) * 6 if -1 not in start else tuple([file if place >= 0 else -1 for place in start])
+    values = six([None if literal is None else float(literal) for literal in given[:6]])
+    last = found.lastindex
+    if last is None or last <= _CARTESIAN:
+        return KrlTarget(values, start, stop, files, None, -1, -1, insert, file)
+    status, turn = (-1 if bits is None else int(number(bits) or 0) for bits in given[6:8])
+    return KrlTarget(values, start, stop, files, None, status, turn, insert, file, _stated(given[8:]))
+
+
+def _plain_axes(raw: bytes, begin: int, end: int, file: int) -> KrlTarget | None:
+    found = _PLAIN_AXES.match(raw, begin, end)
+    if found is None:
+        return None
+    given = found.groups()
+    axes = six([None if literal is None else float(literal) for literal in given[1:7]])
+    external = _stated(given[7:])
+    return KrlTarget(_NONE, axes=axes, insert=found.start(1), home=file, external=external)
+
+
+def _stated(axes: Sequence[bytes | None]) -> External:
+    """E1 .. E6 of their literals."""
+    return tuple([(b"E%d" % i, float(word), word) for i, word in enumerate(axes, 1) if word is not None])
 
 
 def _parse(text: bytes, at: int, file: int, evaluate: Evaluate | None) -> KrlTarget | UnknownValue:

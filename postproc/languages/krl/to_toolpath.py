@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from postproc.base.arrays import Bools, FewRows, Floats, Ints, is_shared
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
-from postproc.languages.krl.controller_data import with_declared_bases
+from postproc.languages.krl.controller_data import with_declared
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.modal_state import Source
 from postproc.languages.krl.motion_rows import MotionRows, RowRefusal
@@ -47,7 +47,8 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
     _refuse_several_starts(rows, table, single)
     _lock(run)
     refused = _refused(rows, table)
-    table.base, frames = with_declared_bases(run.declarations.bases, table.base, run.frames.refs())
+    table.base, frames = with_declared(run.declarations.frames, b"BASE", table.base, run.frames.refs())
+    table.tool, frames = with_declared(run.declarations.frames, b"TOOL", table.tool, frames)
     table.base, table.tool, used = _used(table.base, table.tool, frames)
     table.blend *= MM
     n = len(rows)
@@ -251,7 +252,6 @@ def _number_texts(rows: MotionRows, table: MotionTable, spots: Spots) -> None:
     """Gives the rows and auxiliary points that share a literal one number."""
     n = len(rows)
     parent: dict[int, int] = {}
-    first: dict[tuple[int, int], int] = {}
 
     def top(node: int) -> int:
         above = parent.get(node, node)
@@ -260,24 +260,34 @@ def _number_texts(rows: MotionRows, table: MotionTable, spots: Spots) -> None:
             node, above = above, parent[node]
         return node
 
-    def take(node: int, files: Iterable[int], starts: Iterable[int]) -> None:
-        for place in zip(files, starts, strict=True):
-            if place[1] >= 0 and (other := first.setdefault(place, node)) != node:
-                one, two = sorted((top(node), top(other)))
-                parent[two] = one
-
-    for row, found in table.loose:
-        if found.target is not None:
-            take(row, found.target.file, found.target.start)
     nodes = dict(zip(rows.arcs, range(n, n + len(rows.arcs)), strict=True))
-    for row, node in nodes.items():
-        take(node, rows.arcs[row].file, rows.arcs[row].start)
+    auxiliary = [(rows.arcs[row].file, rows.arcs[row].start) for row in nodes]
+    loose = np.array([row for row, _ in table.loose], np.int64)
+    files, starts = (
+        [spots_of[loose].ravel(), np.array([one[i] for one in auxiliary], spots_of.dtype).ravel()]
+        for i, spots_of in enumerate((spots.file, spots.start))
+    )
+    of = np.concatenate([np.repeat(loose, 6), np.repeat(np.arange(n, n + len(nodes)), 3)])
+    for one, other in _sharing(of, np.concatenate(files), np.concatenate(starts)):
+        first, second = sorted((top(one), top(other)))
+        if first != second:
+            parent[second] = first
     for node in list(parent):
         if node < n:
             spots.text[node] = top(node)
     for row, node in nodes.items():
         if (text := top(node)) != rows.arcs[row].text:
             rows.arcs[row] = rows.arcs[row]._replace(text=text)
+
+
+def _sharing(of: Ints, file: NDArray[np.int8], start: NDArray[Any]) -> Iterable[tuple[int, int]]:
+    """Pairs of those of ``of`` (K,) whose literals are at one place: ``file``, ``start`` (K,), -1 for none."""
+    there = start >= 0
+    of, place = of[there], start[there].astype(np.int64) * 128 + file[there]
+    order = np.argsort(place, kind="stable")
+    place, of = place[order], of[order]
+    same = np.flatnonzero(place[1:] == place[:-1])
+    return zip(of[same].tolist(), of[same + 1].tolist(), strict=True)
 
 
 def _finder(rows: MotionRows, table: MotionTable) -> Callable[[int, str, str], Finding]:
@@ -344,10 +354,11 @@ def _pinned(rows: MotionRows, table: MotionTable, refused: dict[int, Finding]) -
         return pins
     finding = _finder(rows, table)
     every = range(len(rows))
+    lines = table.line.tolist()
     seen: set[Source] = set()
     for row in rows.builds_on:
         if row in refused:
-            message = f"the motion in line {table.line[row]} depends on this end point and is not corrected"
+            message = f"the motion in line {lines[row]} depends on this end point and is not corrected"
             for pin in _among(every, expanded(rows, rows.builds_on[row], seen)):
                 pins.setdefault(pin, finding(pin, rows.reasons[row].code, message))
     seen = set()

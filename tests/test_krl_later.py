@@ -1,0 +1,119 @@
+"""What interrupts, triggers and routines that are not read may change: nothing is claimed that they can undo."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from postproc.base.document import Document
+from postproc.languages.dialect import Program, ReadingSettings
+from postproc.languages.krl import KrlDialect, interpreter
+
+FULL = "{X 1,Y 2,Z 3,A 4,B 5,C 6}"
+MOVED = "{X 9,Y 0,Z 0,A 0,B 0,C 0}"
+HEAD = "DEF part()\nDECL FRAME Q\nBAS(#BASE,1)\nBAS(#TOOL,1)\n$VEL.CP=0.1\n$APO.CDIS=3\n"
+WHEN = {
+    "interrupt": "INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO {}\nINTERRUPT ON 3\n",
+    "global interrupt": "GLOBAL INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO {}\nINTERRUPT ON 3\n",
+    "trigger": "TRIGGER WHEN DISTANCE=0 DELAY=0 DO {} PRIO=-1\n",
+}
+CONFIG = f"DEFDAT $CONFIG PUBLIC\nDECL GLOBAL FRAME P={FULL}\nENDDAT\n"
+
+
+def read(text: str, **siblings: str) -> Program:
+    """``siblings``: modules by their names."""
+    files = {"$config.dat": CONFIG, **{f"{name}.src": body for name, body in siblings.items()}}
+    others = tuple(Document(Path(name), body.encode()) for name, body in files.items())
+    document = Document(Path("part.src"), text.encode())
+    return KrlDialect().read((document,), ReadingSettings(siblings=others))
+
+
+CHANGES = {
+    "base": ("$BASE=BASE_DATA[3]\n", f"LIN {FULL} C_DIS\n"),
+    "tool": ("BAS(#TOOL,3)\n", f"LIN {FULL} C_DIS\n"),
+    "turning": ("$ORI_TYPE=#JOINT\n", f"LIN {FULL} C_DIS\n"),
+    "root": ("$ROBROOT.X=5\n", f"LIN {FULL} C_DIS\n"),
+    "world": ("$WORLD.X=5\n", f"LIN {FULL} C_DIS\n"),
+    "table": (f"BASE_DATA[2]={MOVED}\n", f"BASE_DATA[2]={FULL}\n$BASE=BASE_DATA[2]\nLIN {FULL} C_DIS\n"),
+    "variable": ("P.X=9\n", "LIN P C_DIS\n"),
+}
+SPEED = {"feed": "$VEL.CP=0.7\n", "approximation": "$APO.CDIS=9\n"}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("when", WHEN)
+@pytest.mark.parametrize("where", ["here", "a routine of its own", "another module", "below another module"])
+def test_what_may_change_at_any_time_is_not_claimed(change: str, when: str, where: str) -> None:
+    does, motion = CHANGES[change]
+    later = WHEN[when].format("isr()")
+    isr = f"DEF isr()\n{does}END\n"
+    if where == "here":
+        program = read(f"{HEAD}{later}{motion}END\n{isr}")
+        plain = read(f"{HEAD}{motion}END\n{isr}")
+    elif where == "a routine of its own":
+        program = read(f"{HEAD}{later}{motion}END\nDEF isr()\ninner()\nEND\nDEF inner()\n{does}END\n")
+        plain = read(f"{HEAD}{motion}END\nDEF inner()\n{does}END\n")
+    elif where == "another module":
+        program = read(f"{HEAD}{later}{motion}END\n", isr=isr)
+        plain = read(f"{HEAD}{motion}END\n", isr=isr)
+    else:
+        program = read(f"{HEAD}init()\n{motion}END\n", init=f"DEF init()\n{later}END\n{isr}")
+        plain = read(f"{HEAD}init()\n{motion}END\n", init="DEF init()\nEND\n")
+    path = program.toolpath
+    assert 0 in path.constraints.refused, path.dump()
+    if change not in ("table", "variable") or where == "below another module":
+        assert 0 not in plain.toolpath.constraints.refused
+
+
+@pytest.mark.parametrize("change", SPEED)
+@pytest.mark.parametrize("where", ["here", "another module"])
+@pytest.mark.parametrize("motions", [2, 20])
+def test_a_feed_that_may_change_at_any_time_is_none(change: str, where: str, motions: int) -> None:
+    """In runs of common lines too, and whatever is set again behind."""
+    isr = f"DEF isr()\n{SPEED[change]}END\n"
+    later = WHEN["interrupt"].format("isr()")
+    again = "$VEL.CP=0.2\n$APO.CDIS=4\n"
+    body = f"LIN {FULL} C_DIS\n" * motions
+    if where == "here":
+        program = read(f"{HEAD}{body}{later}{again}{body}END\n{isr}")
+    else:
+        program = read(f"{HEAD}{body}init()\n{again}{body}END\n", init=f"DEF init()\n{later}END\n{isr}")
+    path = program.toolpath
+    assert not path.constraints.refused
+    changed, steady = (path.feed, path.approximation)[:: 1 if change == "feed" else -1]
+    assert np.isfinite(changed[:motions]).all()
+    assert np.isnan(changed[motions : 2 * motions]).all()
+    assert np.isfinite(steady[: 2 * motions]).all()
+
+
+def test_what_is_handed_to_an_interrupt_may_come_back_changed() -> None:
+    text = HEAD + f"Q={FULL}\n" + WHEN["interrupt"].format("isr(Q)") + "LIN Q\nEND\n"
+    changed = read(text + "DEF isr(R:OUT)\nFRAME R\nR.X=4\nEND\n")
+    kept = read(text + "DEF isr(R:IN)\nFRAME R\nR.X=4\nEND\n")
+    assert list(changed.toolpath.constraints.refused) == [0]
+    assert list(kept.toolpath.constraints.refused) == []
+
+
+@pytest.mark.parametrize("fast", [True, False])
+@pytest.mark.parametrize("motions", [1, 20])
+@pytest.mark.parametrize(
+    ("between", "why"),
+    [
+        ("TRIGGER WHEN PATH=0 DELAY=0 DO $OUT[1]=TRUE\n", "TRIGGER"),
+        ("change_tool()\n", "CHANGE_TOOL runs before it and is not read"),
+        ("IF $IN[1]==TRUE THEN\nchange_tool()\nENDIF\n", "CHANGE_TOOL"),
+    ],
+)
+def test_nothing_is_inserted_behind_what_may_have_moved_the_robot(
+    between: str, why: str, motions: int, fast: bool
+) -> None:
+    """Nor behind a trigger, before a run of common lines either; and before the motion behind that, all may be."""
+    run = f"LIN {FULL}\n" * motions
+    text = f"{HEAD}LIN {FULL}\n{between}{run}SPLINE\nSPL {FULL}\nENDSPLINE\nEND\n"
+    path = interpreter.read((Document(Path("part.src"), text.encode()),), fast=fast).toolpath
+    told = path.constraints.no_insert_before
+    assert why in told[1]
+    assert sorted(told) == [1, 1 + motions]
+    assert list(path.constraints.spline_headers) == [1 + motions]
