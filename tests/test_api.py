@@ -113,6 +113,7 @@ def test_a_result_is_a_table_a_dictionary_and_a_few_words(at_samples):
     assert "x_mm" in checked.table()
 
 
+@pytest.mark.slow
 def test_the_other_commands_from_python(at_samples):
     path = "samples/kr270_taught/taught.src"
     done = postproc.verify(path, path, force=True)

@@ -159,7 +159,7 @@ def edit(path: Path, old: str, new: str) -> None:
     path.write_bytes(text.replace(old.encode(), new.encode()))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "same"),
     [
@@ -225,6 +225,7 @@ def test_options_and_a_nearer_cell_are_watched(parts):
     assert done(run(parts / "**/*.src")) == []
 
 
+@pytest.mark.slow
 def test_a_force_beside_the_program_is_watched(parts):
     program(parts / "p1.src", 0, [line for line in LINES if "FORCE" not in line])
     (parts / "cell.yaml").write_text(CELL + "force: 0,100,0@base\n")

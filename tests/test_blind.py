@@ -162,7 +162,7 @@ def name(one):
     return f"{one.row} {' '.join(one.effects)} {one.poses} {one.number}"
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("one", NULLS, ids=name)
 def test_nothing_is_named_where_nothing_is(said, one):
     record = said(one)
@@ -170,7 +170,7 @@ def test_nothing_is_named_where_nothing_is(said, one):
     assert not table.is_named(record)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("one", CLEAR, ids=name)
 def test_what_is_hidden_is_named(said, one):
     assert said(one)["outcome"] == "exact"

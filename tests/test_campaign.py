@@ -43,6 +43,7 @@ def test_plant_and_model_agree():
     assert np.median(np.linalg.norm(readings.value, axis=1)) > 3e-3
 
 
+@pytest.mark.slow
 def test_fits_begin_with_wrong_values():
     begun = rig.values_of(compensated.begun_with(trial(), SEED, 0))
     factor = np.array(list(begun.values())) / TRUE
@@ -50,6 +51,7 @@ def test_fits_begin_with_wrong_values():
     assert np.abs(factor - 1).max() > 0.2
 
 
+@pytest.mark.slow
 def test_every_parameter_is_found():
     done = many()
     assert np.isfinite(done.value).all()
@@ -89,7 +91,7 @@ def test_random_designs_do_not():
     assert np.median(worst) > 2.0
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("past_first_axis", [True, False])
 def test_compensation_with_the_identified_file(tmp_path, past_first_axis):
     """On the way of the command, by files; forces past A1 because its compliance was not looked for."""

@@ -196,6 +196,7 @@ def test_modules_of_one_name_are_of_one_kind():
     assert several == defended
 
 
+@pytest.mark.slow
 def test_no_two_classes_have_one_name():
     """Neither with an underscore before one of them: a reader who searches for a class finds one."""
     places: dict[str, list[str]] = {}

@@ -202,6 +202,7 @@ def source() -> Source:
 ROOMS = sorted({path.relative_to(ROOT).parts[0] for path in ROOT.rglob("*.py")})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("room", ROOMS)
 def test_docstrings_state_shapes_and_errors(room: str) -> None:
     faults = list(source().faults(room))

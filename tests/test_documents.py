@@ -36,7 +36,7 @@ def test_every_readme_of_the_repository_is_a_document():
     assert set(DOCUMENTS) == {path.relative_to(ROOT) for path in found} | {Path("README.md")}
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("document", with_blocks(slow=False), ids=str)
 def test_a_document_prints_what_its_commands_print(document):
     assert not (found := find_drifts(document, slow=False)), "\n".join(map(str, found))

@@ -100,6 +100,7 @@ def test_the_next_program_finds_what_the_first_left(folder):
     refused(folder, "STK008", "no motion cuts")
 
 
+@pytest.mark.slow
 def test_a_blank_as_a_mesh_is_that_of_the_box(folder):
     whole = json.loads(call(folder, "--json", "-").stdout)
     write_stl(folder / "blank.stl", cuboid([0, 0, -30], [100, 60, 0]))
@@ -268,6 +269,7 @@ def test_the_main_job_takes_the_forces_of_the_stock(folder):
     assert not (folder / "compensated").exists()
 
 
+@pytest.mark.slow
 def test_a_plunge_has_its_force_in_the_main_job(folder):
     """Straight down there is no feed across the spindle: the thrust acts along it, away from the part."""
     (folder / "part.ngc").write_text("G21 G90 G17 G54\nT1 M6\nG0 X50 Y30 Z5\nG1 Z-5 F600\nG0 Z30\nM2\n")
@@ -278,6 +280,7 @@ def test_a_plunge_has_its_force_in_the_main_job(folder):
     assert json.loads(result.stdout)["force"]["max_n"] == pytest.approx(thrust, rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_main_job_reports_the_error_of_the_part(folder):
     """A slot: its floor and walls as posted and as compensated; the files of the mesh say the same."""
     result = CliRunner().invoke(main, ["program", str(folder / "part.ngc"), "--force=", "--json", "-"])

@@ -143,7 +143,7 @@ def integrated(cutter, depth, chip=CHIP, slices=4000, angles=4000):
     return force, (thick * r * area).sum()
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("cutter", "depth", "limit"),
     [(BALL, 0.8, 0.02), (BALL, 3.3, 0.02), (BULL, 1.1, 0.005), (BULL, 4.7, 0.005), (CONE, 3.7, 0.005)],
@@ -155,6 +155,7 @@ def test_slots_of_curved_cutters(cutter, depth, limit):
     assert cut.volume[1] == pytest.approx(rate * 10 * MM, rel=limit)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("tilt", [10.0, 30.0])
 def test_a_tilted_ball(tilt):
     """A ball that leans back along the feed: cross-section of the sphere, force by quadrature on the tilted sphere."""
@@ -234,6 +235,7 @@ def test_an_arc_is_cut_as_a_ring():
     assert cut.volume[3] / MM**3 == pytest.approx(new.sum() * 0.05**2 * 5, rel=0.01)
 
 
+@pytest.mark.slow
 def test_short_motions_cut_what_one_long_one_does():
     """A shoulder in motions of 1 mm across a slot of 5 mm that is open already: each motion's volume, and the force."""
     slot = [[100, 80, -20], [100, -80, -20]]

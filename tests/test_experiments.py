@@ -271,6 +271,7 @@ def test_more_information_is_never_worse():
 # Designs
 
 
+@pytest.mark.slow
 def test_table_1_is_beaten(kr270, monkeypatch):
     """The goal: 15 poses give intervals below 0.8 of Table 1's, 30 below 0.55; random poses do not beat it at all."""
     monkeypatch.setattr(pool, "NEARBY", 600)

@@ -75,6 +75,7 @@ def test_the_sample_in_other_units_or_columns_is_refused(compensate, tmp_path, c
     assert not new.exists()
 
 
+@pytest.mark.slow
 def test_identified_again_from_the_new_file(identified, tmp_path):
     """The same values and intervals; intervals of the same readings are no second source."""
     new = tmp_path / "new.yaml"

@@ -170,7 +170,7 @@ def test_a_verification_of_inputs_that_change(request_, job, name):
     assert not result.exists()
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FILES)
 def test_no_input_is_an_output(request_, job, name):
     """Neither of the main job nor of the others, under any of its names."""

@@ -52,6 +52,7 @@ def patterns() -> list[Pattern]:
     return [each for each in find_patterns() if each[0] not in LARGE]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", range(PARTS))
 def test_no_pattern_costs_more_than_linear_time(part):
     costly = {}
@@ -61,6 +62,7 @@ def test_no_pattern_costs_more_than_linear_time(part):
     assert not costly
 
 
+@pytest.mark.slow
 def test_all_modules_are_looked_at():
     places = {name for name, _, _ in patterns()}
     assert len(patterns()) > 120

@@ -242,6 +242,7 @@ def test_every_message_has_a_verb():
     assert wrong == []
 
 
+@pytest.mark.slow
 def test_no_message_has_a_word_that_the_field_does_not_know():
     wrong = [
         f"{path}:{line}: {word!r} in {text}"

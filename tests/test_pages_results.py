@@ -110,6 +110,7 @@ def test_hostile_names_are_text(one):
     assert seen.open == []
 
 
+@pytest.mark.slow
 def test_it_opens_without_network_and_without_a_script(window, one):
     _, page, *_ = one
     for scheme in ("light", "dark"):

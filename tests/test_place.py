@@ -354,6 +354,7 @@ def test_several_programs_share_the_part(job):
     assert both.best.score >= max(one.best.score for one in alone) * 0.999
 
 
+@pytest.mark.slow
 def test_from_python(job):
     done = postproc.place(job.program, force=True, x=(1300, 1700), y=(-400, 0), top=3)
     assert isinstance(done, postproc.Placement)

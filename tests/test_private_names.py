@@ -109,6 +109,7 @@ def test_other_uses_are_no_private_ones(text):
     assert not [*private_uses(text)]
 
 
+@pytest.mark.slow
 def test_no_test_uses_a_private_name():
     found = [
         f"{path.name}:{line}: {name}"
@@ -120,6 +121,7 @@ def test_no_test_uses_a_private_name():
     assert not found, "\n".join(found)
 
 
+@pytest.mark.slow
 def test_no_module_uses_a_private_name_of_another():
     """A class may lie in several files, and a namedtuple has methods that begin with an underscore."""
     found = []

@@ -18,7 +18,7 @@ def diagnosed():
     process.close()
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [0, 1, 8, 10, 11])
 def test_a_wrong_length_is_named_as_that_length(diagnosed, number):
     """Not as millimetres and milliradians that cancel, however the scatter is stated."""
@@ -30,7 +30,7 @@ def test_a_wrong_length_is_named_as_that_length(diagnosed, number):
     assert held["gap closed"] > 0.9
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [0, 5, 8])
 def test_a_scale_of_the_tracker_is_no_effect(diagnosed, number):
     trial, _, answer = diagnosed("scale", number)

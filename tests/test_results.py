@@ -56,7 +56,7 @@ RUNS = {
     "robots": ["robots"],
     "robots, one": ["robots", "kr270_shop.yaml"],
 }  # fmt: skip
-LONG = {"plan, two effects", "learn"}
+LONG = {"plan, two effects", "learn", "engage", "place", "diagnose", "map"}
 SAMPLE = {"identify": CAMPAIGN, "diagnose": MISSING, "engage": "kr270_stock", "learn": "kr270_second_part"}
 FAILING = {
     "report": ["none.src", "--force"],

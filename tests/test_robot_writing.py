@@ -389,6 +389,7 @@ def test_a_value_and_its_interval_keep_their_digits(size, share, word, of_95, si
     assert parameter_text(again, word) == text
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("side", ["lower", "upper"])
 def test_a_value_at_its_bound_stays_within(tmp_path, side):
     """In the unit of the SI, and in the millimetres and degrees of a file that has those."""

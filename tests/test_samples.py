@@ -76,7 +76,7 @@ def test_taught(compensate, sample):
         assert old[old.index(b",S ") :] == new[new.index(b",S ") :]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "growth"),
     [("kr270_panel/panel.src", 1.006), ("kr270_taught/taught.src", 2.8), ("kr270_pocket/pocket.ngc", 2.0)],

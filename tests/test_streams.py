@@ -66,6 +66,7 @@ def test_a_result_that_nobody_gets_is_a_failure(job, words, redirected):
     assert job.nothing_written()
 
 
+@pytest.mark.slow
 def test_a_refusal_stays_one(job):
     job.write([line.replace("X 100.000", "X 99999.000") for line in LINES])
     for redirected in (">/dev/full 2>/dev/full", "<&- >&- 2>&-"):

@@ -85,7 +85,7 @@ def run(folder: Path, words: list[str], blocked: Path | None) -> tuple[int, str,
     return done.returncode, done.stdout + done.stderr, files
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["program", "identify", "diagnose", "batch"])
 def test_the_same_bytes_without_posix_and_without_pinocchio(tmp_path, name):
     hook = tmp_path / "hook"
