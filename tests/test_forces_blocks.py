@@ -98,8 +98,10 @@ def repeated(path: Toolpath, times: int) -> Toolpath:
         for name in (
             "approximation",
             "continues",
+            "drills",
             "external",
             "inverse_time_feed",
+            "spindle",
             "stops",
         )
     }

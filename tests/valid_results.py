@@ -77,7 +77,12 @@ def _is_result(value: object) -> bool:
 
 def faults_of(result):
     """What of a result its schema does not take, in words."""
-    errors = _validators()[result["command"]].iter_errors(result)
+    validator = _validators()[result["command"]]
+    try:
+        errors = list(validator.iter_errors(result))
+    except UnicodeEncodeError:  # a file name that is no text
+        text = json.dumps(result, ensure_ascii=False).encode("utf-8", "replace")
+        errors = list(validator.iter_errors(json.loads(text)))
     return [f"{'.'.join(map(str, error.instance_path))}: {error.message[:300]}" for error in errors]
 
 
