@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -150,6 +151,8 @@ def test_the_command(compensate, job):
     said = compensate("verify", job.program, job.output, "--force")
     assert "compensated" in said.out
     assert "worst places" in said.out
+    assert "verdict: within tolerance along the whole path: 0.0" in said.out
+    assert done.json["verdict"] == "within_tolerance"
 
 
 def test_the_original_itself_is_above_tolerance_and_has_no_mark(compensate, job):
@@ -157,12 +160,16 @@ def test_the_original_itself_is_above_tolerance_and_has_no_mark(compensate, job)
     assert done.code == 3
     assert {finding["code"] for finding in done.json["findings"]} >= {"VER002", "VER003"}
     assert done.json["original"] == done.json["compensated"]
+    assert done.json["verdict"] == "needs_review"
+    said = compensate("verify", job.program, job.program, "--force").out
+    assert re.search(r"verdict: needs review: \d\.\d{4} mm exceeds the tolerance 0\.02 mm, 0\.\d{4} deg", said)
 
 
 def test_without_force_there_is_nothing_to_look_at(compensate, job):
     done = compensate("verify", job.program, job.program)
     assert done.code == 3
     assert "VER004" in done.out
+    assert "verdict: no motion cuts with a force" in done.out
 
 
 @pytest.mark.parametrize("words", [["nowhere.src"], []])

@@ -15,7 +15,14 @@ from postproc.report.checked import Checked
 from postproc.report.formatting import count
 from postproc.report.planned import Planned
 from postproc.report.result_page import ResultPage
-from postproc.report.verified import PathComparison, Verified, distance_table, sampling_notes, worst_table
+from postproc.report.verified import (
+    PathComparison,
+    Verified,
+    distance_table,
+    sampling_notes,
+    verdict_sentence,
+    worst_table,
+)
 
 
 def checked_page(checked: Checked, links: Mapping[str, str]) -> bytes:
@@ -48,10 +55,11 @@ def verified_page(done: Verified, links: Mapping[str, str]) -> bytes:
     worst = [
         _worst(one, name) for name, one in (("compensated", done.compensated), ("original", done.original))
     ]
+    words = verdict_sentence(done)
     return ResultPage(
         what="verification",
         title=Path(done.compensated_file).name,
-        verdict=_verified_words(done),
+        verdict=f"{words[0].upper()}{words[1:]}.",
         exit=done.exit,
         facts=[
             ("original", f"{done.original_file}, {count(done.motions, 'motion')}"),
@@ -90,19 +98,6 @@ def planned_page(planned: Planned, links: Mapping[str, str]) -> bytes:
         findings=planned.findings,
         digests={planned.robot: planned.digest},
     ).html(links)
-
-
-def _verified_words(done: Verified) -> str:
-    if not done.compensated.converged:
-        return "Force and position do not converge everywhere: the errors of the compensated program are not known."
-    before, after = done.original.error.max / MM, done.compensated.error.max / MM
-    if not math.isfinite(after):
-        return "No motion cuts with a force: there is no error to compare."
-    within = after <= done.tolerance / MM
-    return (
-        f"The simulated tool leaves the path by at most {after:.4f} mm, {'within' if within else 'above'} the tolerance"
-        f" of {done.tolerance / MM:g} mm; with the original program by {before:.4f} mm."
-    )
 
 
 def _worst(comparison: PathComparison, name: str) -> Table:

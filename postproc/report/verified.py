@@ -12,7 +12,7 @@ from rich.table import Table
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
 from postproc.report.formatting import in_decimals
-from postproc.report.report import Spread
+from postproc.report.report import REVIEW, WITHIN, Spread
 from postproc.report.result import Columns, Result, columns_of
 from postproc.report.result_keys import complete_result
 from postproc.report.terminal import show_findings
@@ -101,6 +101,15 @@ class Verified(Result):
     findings: tuple[Finding, ...]
     exit: int
 
+    @property
+    def verdict(self) -> str | None:
+        """Whether the compensated program is within the tolerances along its whole path; None where that is not known,
+        or nothing cuts with a force."""
+        error, turn = self.compensated.error.max, self.compensated.turn
+        if not self.compensated.converged or math.isnan(error) or math.isnan(turn):
+            return None
+        return WITHIN if error <= self.tolerance and turn <= self.tolerance_angle else REVIEW
+
     def table(self) -> Columns:
         """The worst places of both programs: program, line, mm, axis, force_n."""
         programs = (("original", self.original), ("compensated", self.compensated))
@@ -122,10 +131,38 @@ class Verified(Result):
             "samples": self.compensated.samples,
             "original": self.original.as_json(),
             "compensated": self.compensated.as_json(),
+            "verdict": self.verdict,
             "findings": [finding.as_json() for finding in self.findings],
             "exit": self.exit,
         }
         return complete_result("verify", result)
+
+
+def verdict_sentence(done: Verified) -> str:
+    """The verdict with its figures."""
+    if not done.compensated.converged:
+        return "not known: force and position do not converge everywhere in the compensated program"
+    if done.verdict is None:
+        return "no motion cuts with a force: there is no error to compare"
+    comparison = done.compensated
+    found = (
+        (
+            f"{comparison.error.max / MM:.4f} mm",
+            f"{done.tolerance / MM:g} mm",
+            comparison.error.max > done.tolerance,
+        ),
+        (
+            f"{comparison.turn / DEG:.4f} deg",
+            f"{done.tolerance_angle / DEG:g} deg",
+            comparison.turn > done.tolerance_angle,
+        ),
+    )
+    if done.verdict == WITHIN:
+        return "within tolerance along the whole path: " + ", ".join(
+            f"{value} of {allowed}" for value, allowed, _ in found
+        )
+    exceeded = [f"{value} exceeds the tolerance {allowed}" for value, allowed, beyond in found if beyond]
+    return f"needs review: {', '.join(exceeded)}"
 
 
 def show(console: Console, done: Verified, verbose: bool = False) -> None:
@@ -141,6 +178,7 @@ def show(console: Console, done: Verified, verbose: bool = False) -> None:
         soft_wrap=True,
     )
     console.print(distance_table(done))
+    console.print(f"verdict: {verdict_sentence(done)}", soft_wrap=True)
     for note in sampling_notes(done.compensated):
         console.print(note, soft_wrap=True)
     if done.compensated.worst:

@@ -8,7 +8,7 @@ from postproc.compensation.correct import MotionOutcome
 from postproc.part.part_figures import FEATURES
 from postproc.report.batched import STATES, WORDS_OF_SUMMARY
 from postproc.report.corrections_csv import STATE_NAMES
-from postproc.report.report import VERDICTS
+from postproc.report.report import REVIEW, VERDICTS, WITHIN
 from postproc.schemas.parts import Schema
 from postproc.schemas.result_parts import (
     ENDING,
@@ -312,6 +312,11 @@ def verify_schema() -> Schema:
             "samples": integer("samples along the compensated program"),
             "original": _simulated("distance of the tool from the desired path, original program"),
             "compensated": _simulated("distance of the tool from the desired path, compensated program"),
+            "verdict": word(
+                "largest errors of the compensated program against the tolerances; null where they are not known",
+                (WITHIN, REVIEW),
+                nullable=True,
+            ),
             "findings": FINDINGS,
             "exit": integer("exit code of the command"),
         },

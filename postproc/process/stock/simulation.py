@@ -286,7 +286,10 @@ def _speeds(
         words = f"{turns[0]:g}" if len(turns) == 1 else f"{turns[0]:g} to {turns[-1]:g}"
         line = int(toolpath.line[rows[0]])
         if stated is None:
-            message = f"the S of the program determines the speed of tool {cutter.number}: {words} 1/min in {len(rows)} motions"
+            message = (
+                f"the S of the program determines the speed of tool {cutter.number}: {words} 1/min in"
+                f" {len(rows)} motions"
+            )
             findings.append(Finding("STK020", message, program, line))
         else:
             message = (
