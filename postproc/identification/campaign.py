@@ -29,7 +29,7 @@ ONE_POSE = 1e-6
 """[rad, m] Motors that differ by less are in one pose."""
 
 
-REST = 1e-12
+REST = 1e-14
 """[rad, m] What may remain of the displacement to an equilibrium: differences of two loads are taken."""
 
 SCALE_NAME = "scale of the tracker"

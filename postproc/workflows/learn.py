@@ -198,7 +198,7 @@ def _findings(
         )
     if result.alternatives:
         names = ", ".join(result.alternatives)
-        findings.append(Finding("LRN013", f"{names}: the points can not distinguish these effects", file))
+        findings.append(Finding("LRN013", f"{names}: the points cannot distinguish these effects", file))
     if result.verdict in ("unknown", "partly_named") and result.surface.size > 0:
         size = float(np.sqrt(np.mean(result.by_field**2)))
         message = f"a smooth error of {size / MM:.3f} mm RMS has no name; it is corrected at this place only"
