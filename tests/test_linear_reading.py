@@ -10,8 +10,12 @@ from linear import MB, MEGABYTES, SECONDS, all_cases, import_readers, measure
 from patterns import Pattern, find_patterns
 from regex_cost import find_ambiguity
 
-LARGE = {"postproc.languages.krl.scan._RUN", "postproc.languages.rapid.plain_lines._RUN"}
-"""Lines of `_LINE` one after the other, all possessive: its line is looked at instead."""
+LARGE = {
+    "postproc.languages.krl.scan._RUN",
+    "postproc.languages.rapid.plain_lines._RUN",
+    "postproc.languages.rapid.named_lines._MOTIONS",
+}
+"""Lines of `_LINE` or `_MOTION` one after the other, all possessive: one line is looked at instead."""
 
 CASES = {f"{case.kind}: {case.name}": case for case in all_cases()}
 PARTS = 32

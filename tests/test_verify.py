@@ -162,7 +162,9 @@ def test_the_original_itself_is_above_tolerance_and_has_no_mark(compensate, job)
     assert done.json["original"] == done.json["compensated"]
     assert done.json["verdict"] == "needs_review"
     said = compensate("verify", job.program, job.program, "--force").out
-    assert re.search(r"verdict: needs review: \d\.\d{4} mm exceeds the tolerance 0\.02 mm, 0\.\d{4} deg", said)
+    assert re.search(
+        r"verdict: needs review: \d\.\d{4} mm exceeds the tolerance 0\.02 mm, 0\.\d{4} deg", said
+    )
 
 
 def test_without_force_there_is_nothing_to_look_at(compensate, job):

@@ -224,8 +224,8 @@ def _direction(task: CompensationProblem, rows: Ints) -> Floats:
 def suspect_corners(
     task: CompensationProblem, result: CorrectionResult, division: Subdivision, motion: Ints
 ) -> Ints:
-    """(L,) those of the corners ``motion`` (K,) that may exceed the tolerance: all near ramps of the force and at inserted
-    points, of others those that are rounded off by more than ``CLOSE`` of it otherwise than in the program.
+    """(L,) those of the corners ``motion`` (K,) that may exceed the tolerance: all near ramps of the force and at
+    inserted points, of others those that are rounded off by more than ``CLOSE`` of it otherwise than in the program.
 
     Where the deflection changes evenly, the tool in the middle of a rounded corner is as far off as the output's corner
     is cut off otherwise than the program's.

@@ -318,9 +318,15 @@ def check_residual(
     rows = division.source[added]
     sizes = [size[:0], *in_blocks(lambda part: _added(task, division, added[part]), len(added))]
     _refuse_large(task, np.concatenate(sizes), path.line[rows], step, file)
+    passed = corrected.copy()
+    if (
+        division.fits is not None
+    ):  # the tool is beside these points: ``corners_not_improved`` compares the paths
+        own = division.fits.point[division.original[division.fits.point]]
+        passed[division.source[own]] = False
     # where the robot had no equilibrium before, nothing is further off
     before, before_angle = (np.nan_to_num(a, nan=np.inf) for a in (result.before, result.before_angle))
-    worse = corrected & ~(result.after <= before + task.tolerance)
+    worse = passed & ~(result.after <= before + task.tolerance)
     _refuse(
         path,
         worse,
@@ -329,7 +335,7 @@ def check_residual(
         file,
     )
     worse = (
-        corrected
+        passed
         & path.constraints.orientation_programmed
         & ~(result.after_angle <= before_angle + task.tolerance_angle)
     )

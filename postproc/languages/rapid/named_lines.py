@@ -140,7 +140,8 @@ class NamedReader:
         end = found.end()
         text = np.frombuffer(raw, np.uint8, end - start, start)
         begins = np.concatenate([[0], np.flatnonzero(text == 0x0A)[:-1] + 1])
-        names = [name.upper() for name in _DECLARATION.findall(raw, start, end)]
+        declared = (_DECLARATION.match(raw, at) for at in (begins + start).tolist())
+        names = [each[1].upper() for each in declared if each is not None]
         brackets = np.flatnonzero(text == 0x5B)
         spots, stops = number_places(text, brackets[np.searchsorted(brackets, begins)])
         values, _ = literals(text, spots.ravel(), stops.ravel(), other_literal)
@@ -189,7 +190,9 @@ class NamedReader:
         """The lines that are like the one of ``first``, from it on."""
         raw, start = self._raw, first.start
         head = max(raw.rfind(b"\n", 0, start), raw.rfind(b"\r", 0, start)) + 1
-        found = None if raw[head:start].strip(b" \t") else _MOTIONS.match(raw, start)
+        if raw[head:start].strip(b" \t") or _MOTION.match(raw, start) is None:
+            return None
+        found = _MOTIONS.match(raw, start)
         if found is None or found.end(3) != first.stop:
             return None
         end = found.end()
