@@ -230,6 +230,10 @@ def test_the_main_job_moves_holes(compensate, job) -> None:
         "verify", program, job.folder / "compensated" / "part.ngc", "--force", "--json", "-"
     )
     assert verified.json["compensated"]["max"] <= 0.02
+    shown = compensate("verify", program, job.folder / "compensated" / "part.ngc", "--force").out
+    assert "verdict: within tolerance" in shown
+    assert "no path between end points is sampled: only holes are compared" in shown
+    assert "(line 0)" not in compensate(program, "--force", "--dry-run").out
 
 
 def test_a_cut_behind_a_hole_is_told(compensate, job) -> None:

@@ -114,10 +114,14 @@ def _transitions(path: PathFigures) -> str:
     transitions = path.transitions
     ramps = f", {_count(path.ramps, 'force ramp')} of at least {path.ramp / MM:g} mm" if path.ramps else ""
     speed = f", {transitions.speed / MM:.1f} mm/s" if math.isfinite(transitions.speed) else ""
+    rate = (
+        f", correction changes by at most {transitions.rate:.3f} mm/mm{speed} (line {transitions.rate_line})"
+        if transitions.rate_line
+        else ""
+    )
     return (
         f"{_count(transitions.lead_ins, 'lead-in')} in air{ramps}; in cuts {_count(transitions.stops, 'stop')} added,"
-        f" {_count(transitions.backwards, 'backward motion')},"
-        f" correction changes by at most {transitions.rate:.3f} mm/mm{speed} (line {transitions.rate_line})"
+        f" {_count(transitions.backwards, 'backward motion')}{rate}"
     )
 
 

@@ -249,6 +249,9 @@ def sampling_notes(comparison: PathComparison) -> list[str]:
 def _describe_sampling(comparison: PathComparison) -> str:
     if not comparison.converged:
         return "force and position do not converge everywhere in the compensated program: its errors are not known"
+    if math.isnan(comparison.ends.max):
+        holes = ": only holes are compared, at their bottom" if comparison.samples else ""
+        return f"no path between end points is sampled{holes}"
     if math.isnan(comparison.change):
         return "the samples are not doubled: there are too many"
     return (
