@@ -36,7 +36,7 @@ def learned_robot_file(
     at_this_place: bool = False,
 ) -> bytes | None:
     """The bytes of ``destination``: the file of ``robot`` with what was learnt of its parameters, intervals and
-    correlations; None where nothing was; ``at_this_place``: with an effect that is not told from others."""
+    correlations; None where nothing was; ``at_this_place``: with an effect that cannot be distinguished from others."""
     kinds = (CauseKind.SHARE, CauseKind.VALUE)
     numbers = [
         i

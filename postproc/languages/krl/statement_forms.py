@@ -89,7 +89,7 @@ def is_well_formed(statement: Statement) -> bool:
 
 @kept
 def _has_form(code: bytes) -> bool:
-    """Whether a statement that is told by its first word has the form that this word asks for."""
+    """Whether a statement that its first word identifies has the form that this word asks for."""
     found = re.match(NAME, code)
     word = found[0].upper() if found else b""
     rest = code[len(word) :].strip(b" \t")
