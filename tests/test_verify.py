@@ -16,10 +16,13 @@ from postproc.compensation.correct import correct
 from postproc.compensation.subdivide import subdivide
 from postproc.compensation.subdivision import Limits
 from postproc.output.write import plan_motions
+from postproc.report.report import Spread
+from postproc.report.verified import verdict_sentence
 from postproc.toolpath import Arcs, Configuration, Kind, Toolpath
 from postproc.verification.pairing import Different, pair_motions
 from postproc.verification.simulator import Simulator
 from postproc.workflows.preparation import Request, prepare
+from postproc.workflows.verify import verify
 
 
 def prepared(path):
@@ -153,6 +156,26 @@ def test_the_command(compensate, job):
     assert "worst places" in said.out
     assert "verdict: within tolerance along the whole path: 0.0" in said.out
     assert done.json["verdict"] == "within_tolerance"
+
+
+def test_the_verdict_is_on_position_and_orientation(compensate, job):
+    """Each alone is enough; without a figure of one of them there is none."""
+    compensate(job.program, "--force", "-q")
+    done = verify(Request(program=job.program, force=""), job.output)
+    assert done.verdict == "within_tolerance"
+    for change, words in (
+        ({"turn": 1.01 * done.tolerance_angle}, "needs review: 0.0101 deg exceeds the tolerance 0.01 deg"),
+        (
+            {"error": Spread(2 * done.tolerance, 0.0, 0.0)},
+            "needs review: 0.0400 mm exceeds the tolerance 0.02 mm",
+        ),
+    ):
+        worse = replace(done, compensated=replace(done.compensated, **change))
+        assert (worse.verdict, verdict_sentence(worse)) == ("needs_review", words)
+    for change in ({"turn": np.nan}, {"converged": False}):
+        unknown = replace(done, compensated=replace(done.compensated, **change))
+        assert unknown.verdict is None
+        assert "within" not in verdict_sentence(unknown)
 
 
 def test_the_original_itself_is_above_tolerance_and_has_no_mark(compensate, job):
