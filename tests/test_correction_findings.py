@@ -13,7 +13,7 @@ from postproc.base.findings import CODES, Finding, Refusal
 from postproc.base.geometry import Poses
 from postproc.compensation.correct import MotionOutcome, correct
 from postproc.compensation.problem import CompensationProblem
-from postproc.toolpath import Kind
+from postproc.toolpath import Configuration, Kind
 
 LEFT, OFF = MotionOutcome.UNCORRECTED, MotionOutcome.OFF
 SECOND_LEFT = [A, C, C, C, A, LEFT, LEFT, LEFT, A]
@@ -342,31 +342,61 @@ STATED = {"kind": KINDS, "status": 2, "turn": 2, "max_correction": 10.0}
 
 
 @pytest.mark.parametrize(
-    ("ends", "told"),
+    ("ends", "told", "reasons"),
     [
-        ({}, []),
-        ({1: (-5.0,)}, [("KIN006", 11, SIDES, "")]),
-        ({3: (-5.0,), 6: (-5.0,)}, []),  # no PTP
-        ({7: (-5.0,), 2: (-5.0,), 5: (-5.0,)}, [("KIN006", 12, SIDES + " (3 motions, to line 17)", "")]),
-        ({5: (-5.0,), 2: (5.0,)}, [("KIN006", 15, SIDES, "")]),
-        ({5: ((4, -50.0),)}, [("KIN006", 15, SIDES, "")]),  # S and T
+        ({}, [], {}),
+        ({1: (-5.0,)}, [(11, "")], {FIRST: 11}),
+        ({3: (-5.0,), 6: (-5.0,)}, [], {}),  # no PTP
+        (
+            {7: (-5.0,), 2: (-5.0,), 5: (-5.0,)},
+            [(12, " (3 motions, to line 17)")],
+            {FIRST: 12, SECOND: 15},
+        ),
+        ({5: (-5.0,), 2: (5.0,)}, [(15, "")], {SECOND: 15}),
+        ({5: ((4, -50.0),)}, [(15, "")], {SECOND: 15}),  # S and T
     ],
 )
-def test_sides_that_are_crossed(ends, told):
-    """S 2 and T 2 are what the program says; turned back A1 stands on the other side of zero."""
-    assert words(correct(made(ends, **STATED))) == told
+def test_sides_that_are_crossed(ends, told, reasons):
+    """S 2 and T 2 are what the program says; turned back A1 stands on the other side of zero: a whole turn away."""
+    expected = [("KIN006", line, SIDES + more, "") for line, more in told]
+    expected += [cut_left(*cut, f"line {line}: KIN006 {SIDES}") for cut, line in reasons.items()]
+    assert words(correct(made(ends, **STATED))) == expected
 
 
-def test_sides_are_crossed_only_by_what_is_corrected():
+def test_the_first_reason_counts():
     result = correct(made({1: (-5.0,), 3: N, 7: (-5.0,)}, **STATED))
-    assert [one[:2] for one in words(result)] == [("COR001", 13), ("COR003", 11), ("KIN006", 17)]
-    assert words(result)[-1] == ("KIN006", 17, SIDES, "")
+    assert [one[:2] for one in words(result)] == [
+        ("COR001", 13),
+        ("KIN006", 11),
+        ("COR003", 11),
+        ("COR003", 15),
+    ]
 
 
 @pytest.mark.parametrize(("status", "turn"), [(2, -1), (-1, 2), (-1, -1)])
-def test_a_motion_that_says_neither_is_on_no_side(status, turn):
+def test_axes_have_no_side_where_no_turn_is_stated(status, turn):
     result = correct(made({2: (-5.0,)}, **{**STATED, "status": status, "turn": turn}))
-    assert [one.line for one in result.findings] == ([12] if max(status, turn) > 0 else [])
+    assert [one.code for one in result.findings] == (["KIN006", "COR003"] if turn > 0 else [])
+
+
+@pytest.mark.parametrize("kind", [Kind.PTP, Kind.LIN])
+def test_another_quadrant_is_reported_and_corrected(kind):
+    """A1 of 5 deg is in quadrant 0, of -5 in -1."""
+    job = made({2: (-5.0,)}, kind=kind)
+    stated = Configuration({"quadrants": np.full(9, 505050)}).for_motions(9)
+    result = correct(replace(job, toolpath=replace(job.toolpath, configuration=stated)))
+    assert [(one.code, one.line) for one in result.findings] == [("KIN013", 12)]
+    assert result.state[2] == C
+
+
+@pytest.mark.parametrize(("angle", "told"), [(185.0, True), (-5.0, False)])
+def test_another_turn_than_that_of_config(angle, told):
+    job = made({2: (angle,)}, kind=Kind.PTP)
+    limits = tuple(replace(one, lower=-9.0, upper=9.0) for one in job.model.robot.joints)
+    job = replace(job, model=replace(job.model, robot=replace(job.model.robot, joints=limits)))
+    stated = Configuration({"revolutions": np.full(9, 7)}).for_motions(9)
+    result = correct(replace(job, toolpath=replace(job.toolpath, configuration=stated)))
+    assert [one.code for one in result.findings] == ["KIN006", "COR003"] * told
 
 
 ABOVE = [5.0, 10.0, 110.0, 10.0, 50.0, 20.0]
@@ -375,7 +405,7 @@ ABOVE = [5.0, 10.0, 110.0, 10.0, 50.0, 20.0]
 
 @pytest.mark.parametrize(
     ("status", "turn", "elbow", "told"),
-    [(-1, 0, 110.0, True), (-1, -1, 110.0, False), (0, -1, -10.0, True), (0, 2, -10.0, True)],
+    [(-1, 0, 110.0, True), (-1, -1, 110.0, False), (0, -1, -10.0, False), (0, 2, -10.0, True)],
 )
 def test_a_number_of_zero_is_said_too(status, turn, elbow, told):
     model = full()
@@ -386,7 +416,7 @@ def test_a_number_of_zero_is_said_too(status, turn, elbow, told):
     q[:, 1] = np.radians(10.0 if elbow > 0 else -60.0)
     given = {"q": q, "model": model, "kind": Kind.PTP, "status": status, "turn": turn, "max_correction": 10.0}
     result = correct(made({2: (-5.0,)}, **given))
-    assert [one.code for one in result.findings] == ["KIN006"] * told
+    assert [one.code for one in result.findings] == ["KIN006", "COR003"] * told
 
 
 def test_postures_near_to_a_singular_one():

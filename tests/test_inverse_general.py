@@ -14,11 +14,12 @@ from postproc.compensation.mirror import mirror, pose_error, predict
 from postproc.effects.effect import Conditions
 from postproc.model import StiffnessModel
 from postproc.robot import newton
-from postproc.robot.axis_track import follow_axes, is_near_singular, nominal_flange, sides, singular_words
+from postproc.robot.axis_track import follow_axes, is_near_singular, nominal_flange, singular_words
 from postproc.robot.description import find_robot, load_robot
 from postproc.robot.geometries import SerialArm
 from postproc.robot.inverse import inverse, status_of
 from postproc.robot.newton import FAR, TOLERANCE, solver_of
+from postproc.robot.stated_branches import sides
 from postproc.toolpath import Kind
 
 DEG = math.pi / 180

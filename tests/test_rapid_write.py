@@ -264,3 +264,32 @@ def test_a_comment_within_a_statement_is_not_taken_along() -> None:
     text = written(program, divided(program, 1, Role.INTERMEDIATE, True))
     assert f"MoveL {target('5.000', 0, 0)},v100,z5,t;\n" in text.replace(" ,", ",")
     assert f"{said}],{tail};" in text
+
+
+@pytest.mark.parametrize(
+    ("angles", "quadrants", "matches"),
+    [
+        ((20.0, 10, 15, 30, 40, 50), "0,0,0", True),
+        ((20.0, 10, 15, 30, 40, 50), "0,4,-4", True),  # whole turns do not count
+        ((20.0, 10, 15, 30, 40, 50), "-1,0,0", False),
+        ((20.0, 10, 15, 30, 40, 50), "0,1,0", False),
+        ((-20.0, 10, 15, 130, 40, -100), "-1,1,-2", True),
+        ((-20.0, 10, 15, 130, 40, -100), "-1,1,-1", False),
+        ((0.001, 10, 15, 30, 40, 50), "-1,0,0", True),  # on the border
+    ],
+)
+def test_quadrants_are_those_of_the_axes(angles, quadrants, matches) -> None:
+    """Axis angles as ABB counts them, and the place to which forward kinematics brings the flange."""
+    robot = load_robot(find_robot("abb_irb6700", None))
+    flange = nominal_flange(robot, np.radians([angles]))
+    q = quaternion_from_rotation(flange.rotation, np.array([[1.0, 0, 0, 0]]))[0]
+    place = ",".join(f"{value:.9f}" for value in flange.position[0] / MM)
+    turn = ",".join(f"{value:.12f}" for value in q)
+    program = read(
+        f"MODULE m\nPROC main()\nMoveJ [[{place}],[{turn}],[{quadrants},0],{EXTRA[10:]}],v9,fine,tool0;\n"
+        "ENDPROC\nENDMODULE\n"
+    )
+    path = program.toolpath
+    track = follow_axes(robot, path, Poses(path.rotation, path.position), np.radians(angles))
+    assert np.degrees(track.q[0]) == pytest.approx(angles, abs=1e-6)
+    assert track.turn_matches.tolist() == [matches]

@@ -13,11 +13,12 @@ from reference import reference_flange
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import Poses, vector_from_rotation, wrapped
 from postproc.model import StiffnessModel
-from postproc.robot.axis_track import follow_axes, is_near_singular, sides
+from postproc.robot.axis_track import follow_axes, is_near_singular
 from postproc.robot.chain import Chain, generalized_force
 from postproc.robot.description import find_robot, load_robot, robot_files
 from postproc.robot.geometries import KukaLengths
 from postproc.robot.inverse import inverse, status_of, turn_of
+from postproc.robot.stated_branches import sides
 from postproc.toolpath import Kind
 
 DEG = math.pi / 180

@@ -22,7 +22,8 @@ from postproc.compensation.cuts import (
 )
 from postproc.compensation.mirror import Correction, pose_error
 from postproc.compensation.problem import CompensationProblem
-from postproc.robot.axis_track import is_near_singular, sides, singular_words
+from postproc.robot.axis_track import is_near_singular, singular_words
+from postproc.robot.stated_branches import changed_sides, mismatch_words
 from postproc.toolpath import Kind
 
 
@@ -122,7 +123,7 @@ def correct(task: CompensationProblem) -> CorrectionResult:
     state[off] = MotionOutcome.OFF
     state[keeps] = MotionOutcome.CORRECTED
     findings += uncorrected_findings(task.file, path, cut, why)
-    corrections.warn_sides(task, keeps, findings)
+    corrections.warn_quadrants(task, keeps, findings)
     _warn_singular(task, predictable[forced[predictable]], findings)
     moved = np.flatnonzero(keeps)
     after, after_angle = corrections.before.copy(), corrections.before_angle.copy()
@@ -184,7 +185,8 @@ def with_residual(task: CompensationProblem, result: CorrectionResult, command: 
 class _CorrectedBlock(NamedTuple):
     """What a block of motions is found to do.  rows (K,): all that were predicted, with deflection (K, 3) [m], before
     (K,) [m] and before_angle [rad]; tried (T,): those of them that were corrected, by shift (T, 3) [m] and turn (T, 3)
-    [rad]; crossed (T,): to the other side of what S or T states; beyond (T,): the limits of an axis."""
+    [rad]; crossed (T,): to where the stated configuration means another full turn; other_quadrant (T,): than stated;
+    beyond (T,): the limits of an axis."""
 
     rows: Ints
     deflection: Floats
@@ -195,6 +197,7 @@ class _CorrectedBlock(NamedTuple):
     turn: Floats
     done: Correction
     crossed: Bools
+    other_quadrant: Bools
     beyond: Bools
 
 
@@ -211,10 +214,11 @@ def _correct_block(task: CompensationProblem, rows: Ints, may: Bools) -> _Correc
     done = task.command(tried, wanted, wrench[may], goal[may], (start[may], displacement[may]))
     path, robot = task.toolpath, task.model.robot
     low, high = robot.limits.T
-    crossed = path.configuration.stated[tried] & (path.kind[tried] == Kind.PTP)
+    crossed = other_quadrant = path.configuration.stated[tried]
     if crossed.any():
-        one, two = sides(robot, task.track.q[tried]), sides(robot, done.q)
-        crossed &= (one[0] != two[0]) | (one[1] != two[1])
+        sides = changed_sides(robot, path.configuration.of(tried), task.track.q[tried], done.q)
+        other_quadrant = sides["quadrants"]
+        crossed = (sides["status"] | sides["turn"] | sides["revolutions"]) & (path.kind[tried] == Kind.PTP)
     return _CorrectedBlock(
         rows,
         shift,
@@ -224,6 +228,7 @@ def _correct_block(task: CompensationProblem, rows: Ints, may: Bools) -> _Correc
         *pose_error(done.command, wanted),
         done,
         crossed,
+        other_quadrant,
         ((done.q < low) | (done.q > high)).any(axis=1),
     )
 
@@ -241,7 +246,7 @@ class _Findings:
         self.iterations = np.zeros(n, np.int8)
         self.history = np.full((1, n), np.nan)
         self.failed: dict[str, list[Ints]] = {}
-        self.crossed: list[int] = []
+        self.other_quadrant: list[int] = []
         self.axes: Floats = np.empty((0, 0))
 
     def put(self, block: _CorrectedBlock) -> None:
@@ -259,13 +264,14 @@ class _Findings:
             self.history = np.concatenate([self.history, np.full((more, self.history.shape[1]), np.nan)])
         self.history[0, tried] = self.before[tried]
         self.history[1 : len(done.history) + 1, tried] = done.history
-        self.crossed += tried[block.crossed].tolist()
+        self.other_quadrant += tried[block.other_quadrant].tolist()
         beyond = block.beyond & done.converged  # what is not is reported as that
         for code, failed in (
             ("COR009", ~done.reachable),
             ("MOD002", ~done.settled),
             ("COR001", ~done.converged),
             ("COR008", beyond),
+            ("KIN006", block.crossed & done.converged),
         ):
             self.failed.setdefault(code, []).append(tried[failed])
         if beyond.any() and not len(self.axes):
@@ -279,20 +285,20 @@ class _Findings:
             "COR001": "the correction does not converge",
             "COR008": "the corrected pose exceeds the limits: "
             + (_axis_beyond(task, self.axes[0]) if len(self.axes) else ""),
+            "KIN006": mismatch_words(task.toolpath.configuration),
         }
         for code, parts in self.failed.items():
             rows = np.concatenate(parts)
             _note(task, why, findings, rows[~_in(why, len(self.before))[rows]], code, words[code])
 
-    def warn_sides(self, task: CompensationProblem, keeps: Bools, findings: list[Finding]) -> None:
-        """S and T are verbatim in the text: they must still be those of the corrected pose."""
-        crossed = np.array([row for row in self.crossed if keeps[row]], np.int64)
-        if len(crossed):
+    def warn_quadrants(self, task: CompensationProblem, keeps: Bools, findings: list[Finding]) -> None:
+        """Quadrants are verbatim in the text: the axes of the corrected pose should still be in them."""
+        rows = np.array([row for row in self.other_quadrant if keeps[row]], np.int64)
+        if len(rows):
             message = (
-                "the target has a Status/Turn mismatch: the corrected pose is on the other side of an axis angle"
-                + _further_findings(task, crossed)
+                "the corrected pose is in another quadrant of axis 1, 4 or 6 than cf1, cf4 and cf6 state"
             )
-            findings.append(_at(task, int(crossed[0]), "KIN006", message))
+            findings.append(_at(task, int(rows[0]), "KIN013", message + _further_findings(task, rows)))
 
 
 def _uncorrectable(

@@ -12,7 +12,6 @@ from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import each_block, in_blocks
 from postproc.base.findings import Topic
 from postproc.base.geometry import Placed, Poses, wrapped
-from postproc.base.units import DEG
 from postproc.robot.description import Robot
 from postproc.robot.external_axes import joint_unit, own_column
 from postproc.robot.geometries import KukaLengths, SerialArm
@@ -29,13 +28,10 @@ from postproc.robot.half_turns import (
     signed,
     turn_senses,
 )
-from postproc.robot.inverse import controller_values, inverse, kuka_angles, status_of, turn_of
+from postproc.robot.inverse import controller_values, inverse, kuka_angles, status_of
 from postproc.robot.newton import follow_rows, weakest
-from postproc.robot.stated_branches import stated_branches
+from postproc.robot.stated_branches import SIGN_MARGIN, stated_branches, turns_match
 from postproc.toolpath import Kind, Toolpath
-
-SIGN_MARGIN = 0.01 * DEG
-"""An axis nearer to zero than this satisfies either sign of T: taught values are rounded."""
 
 WEAK = 0.004
 """Smallest singular value of a general arm's Jacobian (lengths as parts of its size) below which axes turn far.  It
@@ -109,11 +105,8 @@ def follow_axes(
 
         each_block(solve_block, len(solve))
         half_turns = _settle(robot, q, status, toolpath, on_axes, start, base, tool)
-        stated = np.flatnonzero((toolpath.configuration["turn"] >= 0) & cartesian)
-        bits = (toolpath.configuration["turn"][stated, None] >> np.arange(6)) & 1 == 1
-        arm = q[stated, -6:]
-        wrong = (bits != (arm < 0)) & (np.abs(arm) > SIGN_MARGIN) & np.isfinite(arm)
-        turn_holds[stated] = ~wrong.any(axis=1)
+        stated = np.flatnonzero(toolpath.configuration.stated & cartesian)
+        turn_holds[stated] = turns_match(toolpath.configuration.of(stated), q[stated])
 
     low, high = robot.limits.T
     margin = 1e-9
@@ -411,14 +404,6 @@ def _motions(
 def nominal_flange(robot: Robot, q: Floats) -> Poses:
     """Flange poses (N) that the controller computes from joint values (N, n) [rad, m]."""
     return robot.nominal_chain.flange(q)
-
-
-def sides(robot: Robot, q: Floats) -> tuple[Ints, Ints]:
-    """S (N,) and T (N,) of joint values ``q`` (N, n) [rad, m], as the program would state them; both 0 for an arm that
-    is not KUKA's."""
-    if isinstance(robot.nominal, SerialArm):
-        return np.zeros(len(q), np.int64), np.zeros(len(q), np.int64)
-    return status_of(robot.nominal, q), turn_of(q[:, -6:])
 
 
 def is_near_singular(robot: Robot, q: Floats) -> Bools:

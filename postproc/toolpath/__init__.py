@@ -1,7 +1,7 @@
 """The wanted motions of a program: where the text side and the physics side meet."""
 
 from postproc.toolpath.arcs import ArcFrame, Arcs
-from postproc.toolpath.configuration import Configuration
+from postproc.toolpath.configuration import Configuration, pack_quadrants, unpack_quadrants
 from postproc.toolpath.edit_constraints import EditConstraints
 from postproc.toolpath.orientation_control import OrientationControl, OrientationMode, OrientationPath
 from postproc.toolpath.partial_targets import PartialTargets
@@ -34,4 +34,6 @@ __all__ = [
     "Role",
     "Toolpath",
     "external_at",
+    "pack_quadrants",
+    "unpack_quadrants",
 ]

@@ -2,13 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Ints, frozen, shared
+
+QUADRANTS = 50
+"""Quarters of a turn that are stated are at least -50 and below 50."""
+
+
+def pack_quadrants(quadrants: Sequence[float]) -> int:
+    """Three quarters of a turn (cf1, cf4, cf6 of ABB) as one number, the same for the same three; -1 where one is no
+    whole number or too large."""
+    packed = 0
+    for number in quadrants:
+        if number != int(number) or not -QUADRANTS <= number < QUADRANTS:
+            return -1
+        packed = packed * 2 * QUADRANTS + int(number) + QUADRANTS
+    return packed
+
+
+def unpack_quadrants(packed: Ints) -> Ints:
+    """(N, 3) the quarters of ``packed`` (N,)."""
+    parts = packed[:, None] // (2 * QUADRANTS) ** np.arange(2, -1, -1)
+    return np.asarray(parts % (2 * QUADRANTS) - QUADRANTS)
 
 
 @dataclass(frozen=True)
@@ -34,6 +54,10 @@ class Configuration:
         """(N,) the number of this name, -1 where it is not stated."""
         column = self.numbers.get(name)
         return np.broadcast_to(np.int32(-1), self.count) if column is None else column
+
+    def of(self, rows: Ints) -> Configuration:
+        """That of the motions ``rows`` (K,)."""
+        return Configuration({name: one[rows] for name, one in self.numbers.items()}, len(rows))
 
     @cached_property
     def stated(self) -> Bools:

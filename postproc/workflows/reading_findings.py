@@ -30,7 +30,7 @@ def configuration_findings(program: Path, path: Toolpath, track: AxisTrack) -> l
     elsewhere = ~status_matches(path, track) & path.known & np.isin(path.kind, (Kind.LIN, Kind.CIRC))
     findings = []
     for mask, message in (
-        (~track.turn_matches, "the stated T (Turn) is not that of this pose"),
+        (~track.turn_matches & ~elsewhere, _turn_words(path)),
         (elsewhere, "the stated configuration (S, cfx) is not the one in which the robot reaches this pose"),
     ):
         rows = np.flatnonzero(mask)
@@ -38,3 +38,9 @@ def configuration_findings(program: Path, path: Toolpath, track: AxisTrack) -> l
             more = f" ({len(rows)} motions, to line {path.line[rows[-1]]})" if len(rows) > 1 else ""
             findings.append(Finding("KIN007", message + more, str(program), int(path.line[rows[0]])))
     return findings
+
+
+def _turn_words(path: Toolpath) -> str:
+    if "quadrants" in path.configuration.numbers:
+        return "the stated quadrants (cf1, cf4, cf6) are not those of this pose"
+    return "the stated T (Turn) is not that of this pose"

@@ -30,11 +30,9 @@ from postproc.languages.rapid.target_places import (
     target_numbers,
 )
 from postproc.languages.rapid.values import Value, numbers_of
-from postproc.toolpath import COMPUTED, LOST, Kind
+from postproc.toolpath import COMPUTED, LOST, Kind, pack_quadrants
 from postproc.toolpath.initial_state import Symbol
 
-QUADRANTS = 50
-"""Quadrants from -50 to 49 are kept as numbers."""
 FARTHEST = 1e7
 """[mm]"""
 
@@ -259,14 +257,14 @@ def _place_axes(rows: ModuleRows, row: int, fact: MotionFact) -> None:
         rows.refuse(row, *_lost(fact.target))
     else:
         rows.axes[row] = angles
-        rows.quadrants[row] = _packed(tuple(float(angles[axis] // 90.0) for axis in (0, 3, 5)))
+        rows.quadrants[row] = pack_quadrants(tuple(float(angles[axis] // 90.0) for axis in (0, 3, 5)))
 
 
 def _place_configurations(rows: ModuleRows, these: range, fact: MotionFact) -> None:
     def packed(conf: tuple[float, ...] | None) -> tuple[int, int]:
         if conf is None:
             return -1, -1
-        return _packed(conf[:3]), int(conf[3]) if conf[3] in range(8) and fact.checked else -1
+        return pack_quadrants(conf[:3]), int(conf[3]) if conf[3] in range(8) and fact.checked else -1
 
     part = slice(these.start, these.stop)
     if fact.lines is None:
@@ -296,16 +294,6 @@ def _check_targets(rows: ModuleRows, these: range, fact: MotionFact) -> None:
 def _lost(value: Value) -> Problem:
     reason = reason_of(value, "its target is no list of positions")
     return ("RAP003" if "is not declared" in reason else "RAP002"), reason
-
-
-def _packed(quadrants: tuple[float, ...]) -> int:
-    """cf1, cf4, cf6 as one number that is the same for the same three; -1 where one is no quadrant."""
-    packed = 0
-    for number in quadrants:
-        if number != int(number) or not -QUADRANTS <= number < QUADRANTS:
-            return -1
-        packed = packed * 2 * QUADRANTS + int(number) + QUADRANTS
-    return packed
 
 
 def _external(rows: ModuleRows) -> None:
