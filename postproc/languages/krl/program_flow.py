@@ -38,7 +38,7 @@ from postproc.languages.krl.other_modules import (
     visible,
 )
 from postproc.languages.krl.program_structure import INLINE, LATER, Routine, closure
-from postproc.languages.krl.statement_effects import EVERYTHING, HIDDEN, effects_of
+from postproc.languages.krl.statement_effects import EVERYTHING, HIDDEN, effects_of, effects_of_unknown
 from postproc.languages.krl.vectorised import Item, VectorisedLines
 from postproc.toolpath import Annotation
 
@@ -199,6 +199,9 @@ class ProgramFlow(Calls):
         if not item.code.isascii() and kind != "motion" and has_foreign_letters(item.code):
             self._report_letters(item)
         run.variables.line = item.line
+        if item.code in run.survey.ill_formed:
+            why = f"after line {item.line}, which is not understood"
+            run.forget(effects_of_unknown(item.code), why)
         if b"(" in item.code:
             self._call_functions(item)
         if pc in run.survey.events:
