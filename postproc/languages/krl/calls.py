@@ -12,8 +12,8 @@ from postproc.languages.krl.expressions import Value, index_text
 from postproc.languages.krl.external_axes import apart
 from postproc.languages.krl.flow_frames import BlockFrame, LabelHead, Restart
 from postproc.languages.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, split_values
-from postproc.languages.krl.modal_state import ELSEWHERE, TRIGGERED, FrameRegister, ModalState
-from postproc.languages.krl.other_modules import take_exit
+from postproc.languages.krl.modal_state import ELSEWHERE, TRIGGERED, ModalState
+from postproc.languages.krl.other_modules import RoutineExit, take_exit
 from postproc.languages.krl.program_structure import Routine, closure
 from postproc.languages.krl.statement_effects import (
     EVERYTHING,
@@ -344,16 +344,13 @@ class Calls(BlockFlow):
         self._after_other(item, said.name, returned)
         if any(isinstance(effect, str) for effect in returned):
             return  # a parameter that is a variable of the controller
-        exit = self._exit_of(said.name, before, tuple(given))
-        if exit is not None:
-            state, registers = exit
+        left = self._exit_of(said.name, before, tuple(given))
+        if left is not None:
             why = f"after the call of {shown(said.name)} in line {item.line}"
-            take_exit(run.state, state, (run.frames, registers), why, item.line)
+            take_exit(run.state, before, left, run.frames, why, item.line)
 
     @abstractmethod
-    def _exit_of(
-        self, name: bytes, state: ModalState, given: tuple[Value | None, ...]
-    ) -> tuple[ModalState, FrameRegister] | None:
+    def _exit_of(self, name: bytes, state: ModalState, given: tuple[Value | None, ...]) -> RoutineExit | None:
         """What a routine of another module leaves, called with what holds here; None where that is not followed."""
 
     def _after_other(self, item: Statement, name: bytes, words: Set[Effect]) -> None:

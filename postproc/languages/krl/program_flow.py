@@ -34,6 +34,8 @@ from postproc.languages.krl.other_modules import (
     MOST_DEPTH,
     MOST_OUTCOMES,
     MOST_STEPS,
+    RoutineExit,
+    exit_of,
     state_at_entry,
     visible,
 )
@@ -88,9 +90,7 @@ class ProgramFlow(Calls):
             pc = self._step(pc)
         return run.merged(self.activations[-1].returned, self._here())
 
-    def _exit_of(
-        self, name: bytes, state: ModalState, given: tuple[Value | None, ...]
-    ) -> tuple[ModalState, FrameRegister] | None:
+    def _exit_of(self, name: bytes, state: ModalState, given: tuple[Value | None, ...]) -> RoutineExit | None:
         run = self.run
         others = run.others
         module, routine = others.routines[name]
@@ -112,7 +112,7 @@ class ProgramFlow(Calls):
                 following = ProgramFlow(inner, Unfollowed())
                 with contextlib.suppress(Restart):
                     flow = following.outcome(routine, given)
-                    others.outcomes[key] = None if flow is None else (flow.state, register)
+                    others.outcomes[key] = exit_of(flow, register, inner.rows)
                 others.steps += following.steps + len(module.declarations.types)
         return others.outcomes[key]
 
