@@ -196,6 +196,10 @@ class ProgramFlow(Calls):
         kind, said = item.kind, item.strings
         if kind == "comment":
             return pc + 1
+        if kind == "motion" and b"(" not in item.code and pc not in run.survey.events:
+            run.variables.line = item.line
+            motions.move(run, item)
+            return pc + 1
         if not item.code.isascii() and kind != "motion" and has_foreign_letters(item.code):
             self._report_letters(item)
         run.variables.line = item.line
