@@ -264,8 +264,8 @@ CARELESS = {
     "no frame is set in a table": (altered(r"^\s*(BASE|TOOL)_DATA\s*\[.*$", ""), 0.02),
     "no subprogram is called": (altered(r"^\s*sub\d\s*\(.*$", ""), 0.05),
     "no record of frames is taken": (altered(r"^\s*FDAT_ACT\s*=.*$", "FDAT_ACT={TOOL_NO 1,BASE_NO 1}"), 0.05),
-    "nothing comes later": (altered(r"^\s*(TRIGGER|INTERRUPT)\b.*$", ""), 0.05),
-    "what a call gets is its own": (altered(r":\s*OUT|(?<=,p)(?=\))", ":IN"), 0.05),
+    "nothing comes later": (altered(r"^\s*(TRIGGER|INTERRUPT)\b.*$", ""), 0.02),
+    "what a call gets is its own": (altered(r":\s*OUT|(?<=,p)(?=\))", ":IN"), 0.02),
 }
 """And the share of random programs in which that shows, at least."""
 

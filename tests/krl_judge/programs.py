@@ -39,7 +39,7 @@ class Generator(Data):
         self.lines: list[str] = []
         self.labels = 0
         self.module = self.rng.random() < 0.5
-        self.has_later = self.rng.random() < 0.2
+        self.has_later = self.rng.random() < 0.25
 
     def case(self) -> Case:
         rng = self.rng
@@ -242,7 +242,7 @@ class Generator(Data):
                 out += self.call()
             elif kind < 0.68:
                 out += self.spline()
-            elif kind < 0.7 and self.has_later:
+            elif kind < 0.76 and self.has_later:
                 out += self.later()
             elif depth < 3:
                 size -= 1
