@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from abc import abstractmethod
 from collections.abc import Set
+from functools import lru_cache
 
 from postproc.languages.krl.assignments import command, keep
 from postproc.languages.krl.block_flow import BlockFlow
@@ -36,6 +37,11 @@ _PLACE = re.compile(
     rb"(" + NAME + rb")[ \t]*+(?:\[((?:[^\[\]]|\[[^\[\]]*+\])*+)\][ \t]*+)?+(\.[^+*/:=<>(){}-]*+)?+\Z"
 )
 """A variable, an element of it, a component: what a parameter can change."""
+
+
+@lru_cache(maxsize=1024)
+def _not_read(called: str) -> str:
+    return f"{called} is not read: after it the position is not known; base and tool are assumed unchanged"
 
 
 class Calls(BlockFlow):
@@ -331,8 +337,7 @@ class Calls(BlockFlow):
                 "KRL021", f"{called} reads its path from a file; that path is not corrected", item
             )
         else:
-            message = f"{called} is not read: after it the position is not known; base and tool are assumed unchanged"
-            run.add_finding("KRL010", message, item)
+            run.add_finding("KRL010", _not_read(called), item)
 
     def _call_other(self, item: Statement, said: Call) -> None:
         """A routine of another module: what it leaves is worked out, variables are forgotten."""

@@ -103,6 +103,9 @@ class ExecutionContext:
         so none of its literals can be changed for one motion alone."""
         if not effects:
             return
+        if len(effects) == 1 and "point" in effects:  # a call that is not read: the most frequent one
+            self.state.forget({"point"}, why, self.has_tcp_mode, self.has_turning)
+            return
         words = {effect for effect in effects if isinstance(effect, str)}
         self.state.forget(words, why, self.has_tcp_mode, self.has_turning)
         if "root" in words:

@@ -201,6 +201,8 @@ def effects_of_unknown(code: bytes) -> Effects:
 
 def returned_by(said: Call, known: Directions) -> frozenset[Effect]:
     """What a call may change: of what is handed over other than as IN, and is no expression."""
+    if not said.arguments:
+        return frozenset()
     comes_back = known.get(said.name, ())
     names = set()
     for i, text in enumerate(split_values(said.arguments)):
