@@ -145,7 +145,7 @@ def test_a_statement_stands_behind_its_blanks() -> None:
     assert found == Statement("motion", b"LIN", b"LIN P", 2, 5, None, b";c ")
     assert statement(b" ; c\n", 1, 0, 5) == Statement("comment", b"", b"", 1, 1, None, b"; c")
     assert statement(b" \t\n", 1, 0, 3) is None
-    assert statement(b"&ACCESS x\n", 1, 0, 10) is None
+    assert statement(b"&ACCESS x\n", 1, 0, 10) == Statement("header", b"&", b"&ACCESS x", 1, 0)
     strange = statement(b"1\xe5" + b" " * 5 + b";\xe5", 1, 0, 9)
     assert strange is not None
     assert (strange.kind, strange.code) == ("strange", b"1\xe5")
@@ -645,9 +645,9 @@ def test_what_a_statement_changes(line: str, changes: set[object], calls: str) -
         ("IF f(1) AND (g(2)) THEN", ["F", "G"]),
         ("UNTIL NOT(f(1))", ["F"]), ("RETURN f(1)", ["F"]), ("WAIT FOR f(1)", ["F"]), ("WAIT SEC (1)", []),
         ("HALT f(1)", []),
-        ("SPLINE WITH $X=f(1)", []), ('x="f(1)"', []), ("x=#f(1)", []), ("x='f(1)'", []), ("x=a.f(1)", []),
+        ("SPLINE WITH $X=f(1)", ["F"]), ('x="f(1)"', []), ("x=#f(1)", []), ("x='f(1)'", []), ("x=a.f(1)", []),
         ("DEF a(b:IN)", []),
-        ("x=5", []), ("FOR i=f(1) TO (3) STEP (f(2))", ["F"]), ("LIN f(1)", ["F"]), ("CASE f(1)", []),
+        ("x=5", []), ("FOR i=f(1) TO (3) STEP (f(2))", ["F"]), ("LIN f(1)", ["F"]), ("CASE f(1)", ["F"]),
         ("Z\xe4(f(1))", ["F"]),
     ],
 )  # fmt: skip

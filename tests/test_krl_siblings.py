@@ -323,3 +323,32 @@ def test_a_base_that_no_file_states_for_sure_is_that_of_the_cell_alone(
     assert [frame.declared for frame in program.toolpath.frames] == [None] * len(program.toolpath.frames)
     assert not any("BASE_DATA" in message for message in said(program))
     assert any(name.startswith("BASE_DATA") for name in program.unresolved)
+
+
+VARIES = "IF $IN[1] THEN\nLIN {Y 1}\nENDIF\n"
+
+
+@pytest.mark.parametrize(
+    ("module", "after", "second"),
+    [
+        (f"LIN {FULL}\nLIN {{X 70}}\n", "LIN X 5 Y 2 Z 3 A 4 B 5 C 6", "LIN X 5 Y 6 Z 3 A 4 B 5 C 6"),
+        (f"LIN {FULL}\n{VARIES}", "LIN X 5 Y nan Z 3 A 4 B 5 C 6", "LIN X 5 Y 6 Z 3 A 4 B 5 C 6"),
+        (f"IF $IN[1] THEN\nLIN {FULL}\nENDIF\n", "LIN", "LIN"),
+        ("IF FALSE THEN\nLIN {X 70}\nENDIF\n", "LIN X 5 Y 9 Z 9 A 0 B 0 C 0", "LIN X 5 Y 6 Z 9 A 0 B 0 C 0"),
+        ("LIN {X 70}\n", "LIN", "LIN"),
+        (f"LIN {FULL}\nunread()\n", "LIN", "LIN"),
+        (f"BAS(#BASE,2)\nLIN {FULL}\nBAS(#BASE,1)\n", "LIN", "LIN"),
+        ("PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\n", "LIN", "LIN"),
+    ],
+)
+def test_a_point_after_a_call_builds_on_where_the_other_module_ends(
+    tmp_path: Path, module: str, after: str, second: str
+) -> None:
+    """The first motion after it stays: what it omits is not corrected with it; the next one builds on that one."""
+    text = f"{HEAD}LIN {{X 9,Y 9,Z 9,A 0,B 0,C 0}}\nsub()\nLIN {{X 5}}\nLIN {{Y 6}}\n"
+    program = read(tmp_path, text, {"sub.src": f"DEF sub()\n{module}END\n"})
+    rows = [line.partition(" base")[0].partition(" refused")[0] for line in dump(program)]
+    assert rows[1:] == [after, second]
+    moves = "FALSE" not in module
+    assert (1 in program.toolpath.constraints.refused) == moves
+    assert (2 in program.toolpath.constraints.refused) == (second == "LIN")

@@ -2,6 +2,7 @@
 
 Written from the description of the language.  Where that leaves something open (the counter of a FOR after its end,
 what a partial point keeps under another base), values become undetermined; where they decide what comes next, it stops.
+What a TRIGGER or an INTERRUPT does comes at a time of its own: so many motions later as the inputs of the run say.
 """
 
 from __future__ import annotations
@@ -98,6 +99,9 @@ class Machine:
         self.reads: dict[int, int] = {}
         self.scopes: list[Scope] = []
         self.steps = 0
+        self.delay = sum(sum(shown) for shown in inputs.values()) % 4
+        self.waiting: list[tuple[int, int, tuple[tuple, tuple]]] = []
+        self.interrupts: dict[int, tuple[tuple, tuple]] = {}
         self.robot = Robot(memory.cells)
         self.system = self.robot.system
 
@@ -251,8 +255,59 @@ class Machine:
 
     # statements
 
+    def later(self, action: tuple[tuple, tuple], interrupt: int = -1) -> None:
+        """Notes an assignment that comes some motions later."""
+        self.waiting.append((len(self.robot.executed) + self.delay, interrupt, action))
+
+    def come_due(self) -> None:
+        now = len(self.robot.executed)
+        due = [action for when, _, action in self.waiting if when <= now]
+        self.waiting = [waiting for waiting in self.waiting if waiting[0] > now]
+        for place, value in due:
+            assign(self.cell(place), self.value(value), UNDETERMINED)
+
+    def trigger(self, reader: Reader) -> None:
+        reader.take()
+        reader.expect("WHEN")
+        if not reader.accept("DISTANCE"):
+            reader.expect("PATH")
+        reader.expect("=")
+        self.value(reader.expression())
+        reader.expect("DELAY")
+        reader.expect("=")
+        self.value(reader.expression())
+        reader.expect("DO")
+        self.later(self.action(reader))
+
+    def action(self, reader: Reader) -> tuple[tuple, tuple]:
+        place = reader.place(reader.name())
+        reader.expect("=")
+        value = reader.expression()
+        reader.end()
+        return place, value
+
+    def interrupt(self, reader: Reader) -> None:
+        reader.take()
+        if reader.accept("DECL"):
+            number = self.whole(reader.expression())
+            reader.expect("WHEN")
+            reader.expression()
+            reader.expect("DO")
+            self.interrupts[number] = self.action(reader)
+            return
+        is_on = reader.accept("ON")
+        if not is_on:
+            reader.expect("OFF")
+        number = self.whole(reader.expression())
+        if number not in self.interrupts:
+            raise Stop("no such interrupt")
+        self.waiting = [waiting for waiting in self.waiting if waiting[1] != number]
+        if is_on:
+            self.later(self.interrupts[number], number)
+
     def execute(self, scope: Scope, line: Line, at: int) -> int:
         """Executes the statement ``at``; the place of the next one."""
+        self.come_due()
         reader = line.reader()
         word = line.word
         following = line.tokens[1][1] if len(line.tokens) > 1 else ""
@@ -284,8 +339,12 @@ class Machine:
         elif word == "RETURN":
             reader.take()
             raise _Return(self.value(reader.expression()) if reader.kind != "end" else None)
-        elif word in ("HALT", "CONTINUE"):
+        elif word in ("HALT", "CONTINUE", "SPLINE", "ENDSPLINE"):
             pass
+        elif word == "TRIGGER":
+            self.trigger(reader)
+        elif word == "INTERRUPT":
+            self.interrupt(reader)
         elif word == "WAIT":
             reader.take()
             if reader.accept("FOR"):
@@ -398,7 +457,8 @@ class Machine:
     def motion(self, reader: Reader) -> Motion:
         word = reader.take()
         relative = word.endswith("_REL")
-        kind = word.removesuffix("_REL").removeprefix("S")
+        kind = word.removesuffix("_REL")
+        kind = kind if kind == "SPL" else kind.removeprefix("S")
         aux = None
         if kind == "CIRC":
             aux = self.point(reader)
@@ -423,5 +483,5 @@ class Machine:
 
 _MOTIONS = {
     s + word + relative for word in ("PTP", "LIN", "CIRC") for relative in ("", "_REL") for s in ("", "S")
-}
+} | {"SPL"}
 assert not _MOTIONS & set(CLOSES)

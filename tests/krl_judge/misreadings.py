@@ -155,4 +155,65 @@ MISREADINGS = (
             "END\n"
         ),
     ),
+    Misreading(
+        "parts",
+        "A parameter that comes back as a component, or as an element whose index is computed: the variable keeps its"
+        " old value.",
+        Case(
+            "DEF part()\n"
+            "DECL FRAME f\n"
+            "DECL INT n\n"
+            "DECL REAL s[3]\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "f={X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "n=2\n"
+            "s[2]=1\n"
+            "sub(f.X)\n"
+            "LIN f\n"
+            "sub(s[n])\n"
+            "LIN {X s[2],Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n"
+            "DEF sub(w:OUT)\n"
+            "REAL w\n"
+            "w=50\n"
+            "END\n"
+        ),
+    ),
+    Misreading(
+        "controller",
+        "A parameter that is the frame in force, or an entry of the table: later motions are said to stand in the old"
+        " one, and so are motions in the subprogram.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "sub($BASE)\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "sub(TOOL_DATA[2])\n"
+            "BAS(#TOOL,2)\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n"
+            "DEF sub(p)\n"
+            "FRAME p\n"
+            "p.X=9\n"
+            "LIN {X 7,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n"
+        ),
+    ),
+    Misreading(
+        "axes in a frame",
+        "A trigger may change base or tool at any time: an axis motion is said to run with the one before.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "TRIGGER WHEN DISTANCE=0 DELAY=0 DO $TOOL=TOOL_DATA[3]\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\n"
+            "END\n",
+            inputs=({}, {1: (True,)}),
+        ),
+    ),
 )

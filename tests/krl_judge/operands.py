@@ -18,6 +18,8 @@ class Names:
     bools: list[str] = field(default_factory=list)
     counters: list[str] = field(default_factory=list)
     free: list[str] = field(default_factory=list)
+    elements: bool = False
+    """Whether there are lists k[3] of INT and s[3] of REAL."""
 
 
 class Operands:
@@ -48,6 +50,8 @@ class Operands:
             return str(rng.randint(0, 9))
         if kind < 0.65 and names.ints + names.counters:
             return rng.choice(names.ints + names.counters)
+        if kind < 0.69 and names.elements:
+            return f"k[({self.whole(depth + 1)} B_AND 1)+1]"
         if kind < 0.72 and self.has_function and self.routine == 0:
             return f"twice({rng.randint(1, 5)})"
         one, other = self.whole(depth + 1), self.whole(depth + 1)

@@ -3,6 +3,7 @@
     program    = DEF part() declarations settings block END subprogram* function?
     block      = statement+
     statement  = motion | frame | assignment | if | switch | for | while | repeat | loop | call | jump | state | form
+               | later | spline
     motion     = full | partial | named | jump to axes | relative | arc; each with C_DIS, C_VEL or exact
     target     = {X .. C} of numbers, variables, expressions; a point of the .dat or $config.dat; a local frame; an
                  element; a part of a structure; frame : frame
@@ -12,7 +13,11 @@
     if, switch = on constants, on variables, on inputs
     for        = constant bounds, STEP, or a bound from a variable that inputs decide
     while ..   = a counter, or inputs, with EXIT in them
-    call       = subprogram with parameters :IN and :OUT, with and without motions, that set frames or module variables
+    call       = subprogram with parameters :IN and :OUT, with and without motions, that set frames or module variables;
+                 what comes back is a variable, a component, an element with a computed index, a frame or speed in force
+    later      = TRIGGER WHEN DISTANCE|PATH=.. DELAY=.. DO change; INTERRUPT DECL n WHEN input DO change, ON, OFF;
+                 change = a frame, a table entry, a variable or a component of one gets a value
+    spline     = SPLINE, then SPL and SLIN to full and partial points, ENDSPLINE
     jump       = IF .. THEN GOTO over what follows, or back as long as a counter or an input says
     form       = an inline form: FDAT, LDAT or PDAT, BAS(#CP_PARAMS,..), a point of the .dat
     state      = $VEL.CP, $APO.CDIS, $ORI_TYPE, BAS(#VEL_CP,..)
@@ -34,6 +39,7 @@ class Generator(Data):
         self.lines: list[str] = []
         self.labels = 0
         self.module = self.rng.random() < 0.5
+        self.has_later = self.rng.random() < 0.25
 
     def case(self) -> Case:
         rng = self.rng
@@ -234,6 +240,10 @@ class Generator(Data):
                 out += self.idle()
             elif kind < 0.66:
                 out += self.call()
+            elif kind < 0.68:
+                out += self.spline()
+            elif kind < 0.76 and self.has_later:
+                out += self.later()
             elif depth < 3:
                 size -= 1
                 out += self.rng.choice(
@@ -368,10 +378,67 @@ class Generator(Data):
         if not later or not self.names.ints or not self.names.reals:
             return self.motion()
         number = self.rng.choice(later)
-        given = [self.whole(), self.rng.choice(self.names.reals)]
+        given = [self.whole(), self.returned()]
         if way := self.takes_frame[number - 1]:
-            given.append(self.frame_value() if way == "IN" else self.rng.choice(self.names.frames))
-        return [f"sub{number}({','.join(given)})"]
+            places = [*self.names.frames, *self.names.frames, "list[2]", "job.P", "$BASE", "BASE_DATA[2]"]
+            given.append(self.frame_value() if way == "IN" else self.rng.choice(places))
+        seen = given[1].startswith(("$", "s[")) or "." in given[1]
+        plain = self.aggregate("YZABC", plain=True)[1:]
+        shows = [f"LIN {{X {given[1]},{plain}"] if seen and self.rng.random() < 0.7 else []
+        return [f"sub{number}({','.join(given)})", *shows]
+
+    def returned(self) -> str:
+        """A REAL that a call may change."""
+        rng, names = self.rng, self.names
+        if rng.random() < 0.7 or not names.frames:
+            return rng.choice(names.reals)
+        places = [
+            f"{rng.choice(names.frames)}.X",
+            f"s[({self.whole()} B_AND 1)+1]",
+            "list[1].Y",
+            "$VEL.CP",
+            "$BASE.Z",
+        ]
+        return rng.choice(places)
+
+    def later(self) -> list[str]:
+        """A change that comes at a time of its own."""
+        rng, names = self.rng, self.names
+        changes = [
+            f"{rng.choice(names.reals)}={self.number(0, 50)}",
+            "$BASE=BASE_DATA[2]",
+            "$TOOL=TOOL_DATA[3]",
+        ]
+        changes += [f"{name}={self.aggregate(plain=True)}" for name in names.frames[:2]]
+        changes += [f"{name}.X={self.number()}" for name in names.frames[:1]]
+        changes += [
+            f"BASE_DATA[1].X={self.number()}",
+            "$VEL.CP=0.25",
+            f"list[1]={self.aggregate(plain=True)}",
+        ]
+        change = rng.choice(changes)
+        if rng.random() < 0.6:
+            where = rng.choice(["DISTANCE=0", "DISTANCE=1", "PATH=-5"])
+            return [
+                f"TRIGGER WHEN {where} DELAY={rng.randint(0, 20)} DO {change}",
+                *self.probe(),
+                *self.probe(),
+            ]
+        number = rng.randint(1, 30)
+        declared = f"INTERRUPT DECL {number} WHEN $IN[{rng.choice(INPUTS)}]==TRUE DO {change}"
+        return [
+            declared,
+            *self.motion(),
+            f"INTERRUPT ON {number}",
+            *self.probe(),
+            f"INTERRUPT OFF {number}",
+            *self.probe(),
+        ]
+
+    def spline(self) -> list[str]:
+        rng = self.rng
+        inner = [f"{rng.choice(['SPL', 'SPL', 'SLIN'])} {self.target()}" for _ in range(rng.randint(1, 4))]
+        return ["SPLINE", *inner, "ENDSPLINE", *self.probe()]
 
     # routines
 
@@ -388,11 +455,22 @@ class Generator(Data):
             if not more:
                 hidden = ["mi=2", "mj=3", f"pf={self.aggregate(plain=True)}"]
         out = ["DECL INT mi,mj", "DECL FRAME pf"] if hidden else []
-        out += ["DECL INT n,m,i,j,k", "DECL REAL r,q", f"DECL {self.frame_type} f,g", "DECL BOOL b"]
+        names.elements = rng.random() < 0.3
+        names.free[2] = "kk"
+        out += [
+            "DECL INT n,m,i,j,kk,k[3]",
+            "DECL REAL r,q,s[3]",
+            f"DECL {self.frame_type} f,g",
+            "DECL BOOL b",
+        ]
         first = [f"{name}={rng.randint(0, 6)}" for name in ("n", "m")]
         first += [f"{name}={self.number(0, 50)}" for name in ("r", "q")]
         first += [f"{name}={self.aggregate(plain=True)}" for name in ("f", "g")]
         first.append(f"b={rng.choice(['TRUE', 'FALSE'])}")
+        first += [f"{name}[{n}]={rng.randint(0, 9)}" for name in ("k", "s") for n in (1, 2, 3)]
+        if names.elements:
+            names.ints.append("k[1]")
+            names.reals.append("s[2]")
         first += hidden
         rng.shuffle(first)
         return out + first

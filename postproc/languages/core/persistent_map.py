@@ -55,9 +55,13 @@ class PersistentMap:
     def set(self, key: Hashable, value: Any) -> PersistentMap:
         """The map with another value of a key; None takes it out."""
         number = self.numbers.of(key)
-        grown = self._reaching(number)
-        root = _set(grown.root, BITS * grown.depth, number, value)
-        return self if root is grown.root else PersistentMap(self.numbers, root, grown.depth)
+        root, depth = self.root, self.depth
+        while number >> (BITS * (depth + 1)):
+            root, depth = (root, *_EMPTY[1:]), depth + 1
+        changed = _set(root, BITS * depth, number, value)
+        return (
+            self if changed is root and depth == self.depth else PersistentMap(self.numbers, changed, depth)
+        )
 
     def items(self) -> Iterator[tuple[Any, Any]]:
         for number, value in _walk(self.root, self.depth, 0):
@@ -72,12 +76,6 @@ class PersistentMap:
         own, others = (m._deepened(depth) for m in (self, other))
         root = _merged(own.root, others.root, depth, 0, self.numbers.keys, merge)
         return self if root is own.root else PersistentMap(self.numbers, root, depth)
-
-    def _reaching(self, number: int) -> PersistentMap:
-        depth = self.depth
-        while number >> (BITS * (depth + 1)):
-            depth += 1
-        return self._deepened(depth)
 
     def _deepened(self, depth: int) -> PersistentMap:
         if depth == self.depth:
@@ -94,7 +92,9 @@ def _set(node: tuple[Any, ...], shift: int, number: int, value: Any) -> tuple[An
         value = _set(node[at] or _EMPTY, shift - BITS, number, value)
     if node[at] is value:
         return node
-    return (*node[:at], value, *node[at + 1 :])
+    changed = list(node)
+    changed[at] = value
+    return tuple(changed)
 
 
 def _walk(node: tuple[Any, ...], depth: int, base: int) -> Iterator[tuple[int, Any]]:

@@ -108,6 +108,8 @@ class BlockFlow(OpenBlocks):
             if self.repeating or self.jumped:
                 self.spent += 1
             case = self._item(at)
+            if case.word == b"DEFAULT" and at != block.branches[-1]:
+                return None
             wanted = self._values(case.code[4:]) if case.word == b"CASE" else [value]
             if wanted is None:
                 return None

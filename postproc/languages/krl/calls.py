@@ -5,19 +5,23 @@ from __future__ import annotations
 import re
 from abc import abstractmethod
 from collections.abc import Set
+from functools import lru_cache
 
 from postproc.languages.krl.assignments import command, keep
 from postproc.languages.krl.block_flow import BlockFlow
-from postproc.languages.krl.expressions import Value
+from postproc.languages.krl.expressions import Value, index_text
 from postproc.languages.krl.external_axes import apart
 from postproc.languages.krl.flow_frames import BlockFrame, LabelHead, Restart
 from postproc.languages.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, split_values
-from postproc.languages.krl.modal_state import ELSEWHERE, TRIGGERED, FrameRegister, ModalState
-from postproc.languages.krl.other_modules import take_exit
+from postproc.languages.krl.modal_state import ELSEWHERE, TRIGGERED, ModalState
+from postproc.languages.krl.other_modules import RoutineExit, take_exit
 from postproc.languages.krl.program_structure import Routine, closure
 from postproc.languages.krl.statement_effects import (
     EVERYTHING,
     PATH_FROM_FILE,
+    SYSTEM,
+    Effect,
+    as_effects,
     functions_of,
     is_harmless,
     returned_by,
@@ -29,7 +33,15 @@ from postproc.languages.krl.vectorised import Item
 MOST_CALLS = 30
 """Calls inside of one another that are followed."""
 
-_PLAIN_NAME = re.compile(rb"[ \t]*+(" + NAME + rb")[ \t]*+(\[[ \t]*+\d++[ \t]*+\])?[ \t]*+\Z")
+_PLACE = re.compile(
+    rb"(" + NAME + rb")[ \t]*+(?:\[((?:[^\[\]]|\[[^\[\]]*+\])*+)\][ \t]*+)?+(\.[^+*/:=<>(){}-]*+)?+\Z"
+)
+"""A variable, an element of it, a component: what a parameter can change."""
+
+
+@lru_cache(maxsize=1024)
+def _not_read(called: str) -> str:
+    return f"{called} is not read: after it the position is not known; base and tool are assumed unchanged"
 
 
 class Calls(BlockFlow):
@@ -196,6 +208,8 @@ class Calls(BlockFlow):
         for value, name, path in back:
             if value is not None:
                 keep(run, name, path, value)
+        if call.lost:
+            run.forget(set(call.lost), f"after the call in line {self._item(call.back - 1).line}")
         return call.back
 
     def _call(self, pc: int, item: Statement, said: Call) -> int:
@@ -207,7 +221,7 @@ class Calls(BlockFlow):
         if routine is None and said.name in run.others.routines:
             self._call_other(item, said)
             return pc + 1
-        if routine is not None and self._follows(said.name, routine) and not self._aliased(said, routine):
+        if routine is not None and self._follows(said.name, routine) and self._can_return(said, routine):
             return self._enter_call(pc, said, routine)
         run.mentioned |= identifiers(said.arguments)
         self._called(item, said.name, returned_by(said, run.survey.directions))
@@ -225,26 +239,27 @@ class Calls(BlockFlow):
             return False
         return len(self.activations) <= MOST_CALLS
 
-    def _aliased(self, said: Call, routine: Routine) -> bool:
-        """Whether a parameter that comes back is a variable that the subprogram knows by its own name too."""
+    def _can_return(self, said: Call, routine: Routine) -> bool:
+        """Whether each parameter that comes back is a variable that the subprogram, and the controller, do not know by
+        its own name too."""
         run = self.run
         given = [text.strip() for text in split_values(said.arguments)]
         names = [
             found[1].upper()
             for (_, comes_back), text in zip(routine.parameters, given, strict=False)
-            if comes_back and (found := _PLAIN_NAME.match(text))
+            if comes_back and (found := _PLACE.match(text))
         ]
         if not names:
-            return False
-        if len(set(names)) < len(names):
             return True
+        if len(set(names)) < len(names) or any(name in SYSTEM or name.startswith(b"$") for name in names):
+            return False
         for name in closure(run.survey, [routine.name]):
             inner = run.survey.routines[name]
             first, last = run.code[inner.start], run.code[min(inner.end, len(run.code) - 1)]
             mentioned = self._mentioned(first, last)
             if any(one in mentioned and one not in inner.types for one in names):
-                return True
-        return False
+                return False
+        return True
 
     def _mentioned(self, first: Item, last: Item) -> frozenset[bytes]:
         """The names between two statements."""
@@ -260,15 +275,19 @@ class Calls(BlockFlow):
         texts = [text.strip() for text in split_values(said.arguments)]
         given: dict[bytes, Entry] = {}
         returned = []
+        lost = set()
         for (name, comes_back), text in zip(routine.parameters, texts, strict=False):
             value = run.value(text) if text else None
             given[name] = {} if value is None else {b"": value}
-            found = _PLAIN_NAME.match(text)
+            found = _PLACE.match(text)
             if comes_back and found:
-                path = (found[2] or b"").replace(b" ", b"").replace(b"\t", b"")
-                returned.append((name, found[1].upper(), path))
+                element = b"" if found[2] is None else index_text(found[2], run.lookup)
+                if found[3] or element is None:
+                    lost.add(found[1].upper())
+                else:
+                    returned.append((name, found[1].upper(), b"[" + element + b"]" if element else b""))
         frame = self._push(routine, True)
-        frame.back, frame.returned = pc + 1, tuple(returned)
+        frame.back, frame.returned, frame.lost = pc + 1, tuple(returned), frozenset(lost)
         self.activations.append(self._activation())
         own = run.routine.types if run.routine is not None else {}
         names = dict.fromkeys([*own, *routine.types])
@@ -289,9 +308,9 @@ class Calls(BlockFlow):
 
     def _call_functions(self, item: Statement) -> None:
         for name in functions_of(item):
-            self._called(item, name, identifiers(item.code))
+            self._called(item, name, as_effects(identifiers(item.code)))
 
-    def _called(self, item: Statement, name: bytes, words: Set[bytes]) -> None:
+    def _called(self, item: Statement, name: bytes, words: Set[Effect]) -> None:
         """Takes up that a routine or function ran; ``words``: what may come back from it changed."""
         run = self.run
         called = shown(name)
@@ -318,8 +337,7 @@ class Calls(BlockFlow):
                 "KRL021", f"{called} reads its path from a file; that path is not corrected", item
             )
         else:
-            message = f"{called} is not read: after it the position is not known; base and tool are assumed unchanged"
-            run.add_finding("KRL010", message, item)
+            run.add_finding("KRL010", _not_read(called), item)
 
     def _call_other(self, item: Statement, said: Call) -> None:
         """A routine of another module: what it leaves is worked out, variables are forgotten."""
@@ -327,20 +345,20 @@ class Calls(BlockFlow):
         run.mentioned |= identifiers(said.arguments)
         given = [run.value(text.strip()) if text.strip() else None for text in split_values(said.arguments)]
         before = run.state.copy()
-        self._after_other(item, said.name, returned_by(said, run.survey.directions))
-        exit = self._exit_of(said.name, before, tuple(given))
-        if exit is not None:
-            state, registers = exit
+        returned = returned_by(said, run.survey.directions)
+        self._after_other(item, said.name, returned)
+        if any(isinstance(effect, str) for effect in returned):
+            return  # a parameter that is a variable of the controller
+        left = self._exit_of(said.name, before, tuple(given))
+        if left is not None:
             why = f"after the call of {shown(said.name)} in line {item.line}"
-            take_exit(run.state, state, (run.frames, registers), why, item.line)
+            take_exit(run.state, before, left, run.frames, why, item.line)
 
     @abstractmethod
-    def _exit_of(
-        self, name: bytes, state: ModalState, given: tuple[Value | None, ...]
-    ) -> tuple[ModalState, FrameRegister] | None:
+    def _exit_of(self, name: bytes, state: ModalState, given: tuple[Value | None, ...]) -> RoutineExit | None:
         """What a routine of another module leaves, called with what holds here; None where that is not followed."""
 
-    def _after_other(self, item: Statement, name: bytes, words: Set[bytes]) -> None:
+    def _after_other(self, item: Statement, name: bytes, words: Set[Effect]) -> None:
         """Takes up what a routine of another module may change."""
         run = self.run
         effects = run.effects_of_others[name]

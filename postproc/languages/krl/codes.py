@@ -278,7 +278,7 @@ CODES = define(
             "warning",
             "statement that is not understood",
             meaning="The statement, or a word in it, is none that this tool knows.",
-            consequence="What it does is not known; the motions after it are read as if it did nothing.",
+            consequence="After it, what it may assign is not known; all else is read as it was before it.",
             action="Correct the statement, or check that it changes no position, base or tool.",
             example="`WAIT SEC 0.5 0.7`, or `IF $IN[1] THAN`.",
         ),

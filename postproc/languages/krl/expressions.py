@@ -18,6 +18,8 @@ Value = int | float | bool | bytes | KrlTarget | UnknownValue
 Lookup = Callable[[bytes, bytes], Value | None]
 """The value of a variable: its name, and what follows it (``[2].X``), upper case, indices as numbers."""
 
+_SHORT = 100
+"""Bytes of an expression whose tokens are kept: some come again and again."""
 DEEPEST = 40
 """Nesting of brackets; a deeper expression is no KRL that anybody wrote."""
 
@@ -67,9 +69,9 @@ class _NotConstant(Exception):
 
 def evaluate(text: bytes, lookup: Lookup) -> Value:
     """The value of an expression; UnknownValue where it is not one of constants."""
-    plain = number(text) if len(text) < 40 else None
+    plain = _plain(text) if len(text) < 40 else None
     if plain is not None:
-        return plain if b"." in text or (b"e" in text.lower() and b"'" not in text) else int(plain)
+        return plain
     if _NAME.match(text) and text.upper() not in _SYSTEM:
         value = lookup(text.upper(), b"")
         return value if value is not None else _no_constant(text)
@@ -90,6 +92,15 @@ def evaluate(text: bytes, lookup: Lookup) -> Value:
     if isinstance(value, (int, float)) and not math.isfinite(value):
         return UnknownValue("KRL002", f"'{shown(text)}' has no value")
     return value
+
+
+@lru_cache(maxsize=4096)
+def _plain(text: bytes) -> int | float | None:
+    """The value of a literal; None of what is none."""
+    plain = number(text)
+    if plain is None:
+        return None
+    return plain if b"." in text or (b"e" in text.lower() and b"'" not in text) else int(plain)
 
 
 def index_text(text: bytes, lookup: Lookup) -> bytes | None:
@@ -118,12 +129,25 @@ def _no_constant(name: bytes) -> UnknownValue:
     return UnknownValue("KRL002", f"{shown(name)} is not a constant of the program")
 
 
+def _token(text: bytes, at: int) -> tuple[str, bytes, int]:
+    """Kind, token and end of what follows place ``at``."""
+    found = TOKEN.match(text, at)
+    if found is None:
+        return "odd" if text[at:].strip() else "end", b"", at
+    kind = found.lastgroup or ""
+    return kind, found[kind].upper() if kind != "text" else found["text"], found.end()
+
+
+_kept_token = lru_cache(maxsize=4096)(_token)
+
+
 class _Parser:
     """Recursive descent; evaluates as it goes.  ``place``: after what was read; ``token``: what is there, of the
     ``kind`` that its first letter tells."""
 
     def __init__(self, text: bytes, lookup: Lookup) -> None:
         self.text, self.lookup = text, lookup
+        self._read = _kept_token if len(text) <= _SHORT else _token
         self.place = 0
         self.kind, self.token = "", b""
         self.after = 0
@@ -131,15 +155,7 @@ class _Parser:
 
     def _next(self) -> None:
         self.place = self.after
-        found = TOKEN.match(self.text, self.after)
-        if found is None:
-            self.kind, self.token = "end", b""
-            if self.text[self.after :].strip():
-                self.kind = "odd"
-            return
-        self.kind = found.lastgroup or ""
-        self.token = found[self.kind].upper() if self.kind != "text" else found["text"]
-        self.after = found.end()
+        self.kind, self.token, self.after = self._read(self.text, self.after)
 
     def _unknown(self, why: str) -> _NotConstant:
         return _NotConstant(UnknownValue("KRL002", why))

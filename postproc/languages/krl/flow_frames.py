@@ -36,7 +36,8 @@ class BlockFrame:
     in it, leave it so far.  Of branches: chosen: index of the only one that runs, None where any may; falls_through:
     none of them may run.  Of loops that are not followed: head: what holds before each pass; mark: of its sources.
     counter: of a FOR that is followed: name, value, last value, step.  Of a call: back: where it goes on; returned:
-    which parameter comes back into which variable (name, path); saved: what the caller's variables hold.
+    which parameter comes back into which variable (name, path); lost: variables of which one changes a part; saved:
+    what the caller's variables hold.
     """
 
     block: Block
@@ -51,6 +52,7 @@ class BlockFrame:
     counter: tuple[bytes, int, int, int] | None = None
     back: int = -1
     returned: tuple[tuple[bytes, bytes, bytes], ...] = ()
+    lost: frozenset[bytes] = frozenset()
     saved: tuple[tuple[bytes, PersistentMap | None], ...] = ()
 
     @property

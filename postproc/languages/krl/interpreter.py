@@ -30,7 +30,6 @@ from postproc.languages.krl.other_modules import is_module, read_modules, visibl
 from postproc.languages.krl.program_flow import ProgramFlow
 from postproc.languages.krl.program_structure import ProgramStructure, program_structure
 from postproc.languages.krl.scan import scan
-from postproc.languages.krl.statement_forms import is_well_formed
 from postproc.languages.krl.target import shown
 from postproc.languages.krl.to_toolpath import to_toolpath
 from postproc.languages.krl.variables import Variables
@@ -235,7 +234,7 @@ def _report_forms(run: ExecutionContext) -> None:
     chunks = (chunk for chunk in run.rows.chunks if isinstance(chunk, list))
     rows = {row.line for chunk in chunks for row in chunk if row.kind == Kind.OTHER}
     for item in run.code:
-        if isinstance(item, Statement) and item.line not in rows and not is_well_formed(item):
+        if isinstance(item, Statement) and item.code in run.survey.ill_formed and item.line not in rows:
             message = f"'{shown(item.code)}' is not understood; what it does is not known"
             run.add_finding("KRL034", message, item)
 

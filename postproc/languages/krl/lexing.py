@@ -202,7 +202,8 @@ def lines(document: Document) -> Iterator[tuple[int, int, int]]:
 
 
 def statement(raw: bytes, line: int, start: int, stop: int) -> Statement | None:
-    """The statement of a line; None for an empty or a header line.  A pure comment is of kind "comment"."""
+    """The statement of a line; None for an empty one.  A pure comment is of kind "comment", a line of the header, which
+    is before the first DEF, of kind "header"."""
     found = _parts_of(raw[start:stop])
     if found is None:
         return None
@@ -222,7 +223,7 @@ def _parts_of(line: bytes) -> tuple[str, bytes, bytes, int, Said, bytes] | None:
     if not code:
         return ("comment", b"", b"", at, None, comment) if comment else None
     if code.startswith(b"&"):
-        return None
+        return "header", b"&", code, at, None, comment
     first = _FIRST.match(code)
     word = first[1].upper() if first else b""
     kind, said = _kind(word, code, at)

@@ -50,6 +50,13 @@ def extent(statement: Statement, operand: Operand | None) -> tuple[int, int, int
     return at, operand.start, operand.stop, stop
 
 
+def _frames(state: ModalState, kind: Kind) -> tuple[int, int]:
+    """Indices of base and tool; of an axis motion, which no finding refuses, where nothing changes them meanwhile."""
+    if kind is Kind.AXIS and state.later_since:
+        return -1, -1
+    return index(state.base), index(state.tool)
+
+
 def enter_motion(
     run: ExecutionContext, statement: Statement, kind: Kind, operand: Operand, reason: RowRefusal | None, blend: float,
     way: Arc | None = None, relative: bool = False,
@@ -99,7 +106,7 @@ def enter_motion(
     row = rows.add(
         MotionRow(
             kind, statement.line, extent(statement, operand), values or NAN6, axes or NAN6,
-            NAN if kind in (Kind.PTP, Kind.AXIS) else state.steady_feed, index(state.base), index(state.tool), blend,
+            NAN if kind in (Kind.PTP, Kind.AXIS) else state.steady_feed, *_frames(state, kind), blend,
             stated, _inherits(stated, relative), path_of(way) if values is not None else NO_ARC,
             state.orientation, state.arc_frame, external,
         ),

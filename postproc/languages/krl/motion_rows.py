@@ -139,7 +139,7 @@ class MotionRows:
 
     def note_sources(self, sources: frozenset[Source]) -> None:
         """Notes where the next row may start, if that is not where the row before ends."""
-        if sources != {self.count - 1}:
+        if len(sources) != 1 or self.count - 1 not in sources:
             self.sources_of[self.count] = sources
 
     def new_mark(self) -> bytes:

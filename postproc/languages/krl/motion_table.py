@@ -19,6 +19,8 @@ from postproc.languages.krl.target import KrlTarget
 from postproc.languages.krl.vectorised import VectorisedLines
 from postproc.toolpath import Kind
 
+BLOCK = 1 << 14
+"""Rows whose entries are brought into columns together."""
 NOTHING = KrlTarget((None,) * 6)
 """Of a motion without a readable target."""
 
@@ -96,7 +98,8 @@ class MotionTable:
         while rows.chunks:
             chunk = rows.chunks.pop()
             if isinstance(chunk, list):
-                self._fill(at, chunk)
+                for first in range(0, len(chunk), BLOCK):  # columns of all of them take much memory
+                    self._fill(at + first, chunk[first : first + BLOCK])
                 at += len(chunk)
                 continue
             bulk = chunk.bulk

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.expressions import index_text
-from postproc.languages.krl.lexing import NAME, identifiers
+from postproc.languages.krl.lexing import NAME, identifiers, kept
 from postproc.languages.krl.source_map import PointVariable
 from postproc.languages.krl.statement_effects import HERE, READS_POSITION
 from postproc.languages.krl.target import KrlTarget, UnknownValue, parse, plain, shown
@@ -111,10 +111,10 @@ def operand_at(run: ExecutionContext, code: bytes, at: int, place: tuple[int, in
     """The target that is at ``place`` of the code, which starts at byte ``at``."""
     start, stop = place
     begin, end = at + start, at + stop
-    if (literal := plain(run.document.raw, begin, end, 0)) is not None:
-        return Operand(literal, begin, end)
     text = code[start:stop]
     if text.startswith(b"{"):
+        if (literal := plain(run.document.raw, begin, end, 0)) is not None:
+            return Operand(literal, begin, end)
         close = text.find(b"}")
         if close == len(text) - 1 and b"{" not in text[1:]:
             if b'"' in text:
@@ -129,36 +129,54 @@ def operand_at(run: ExecutionContext, code: bytes, at: int, place: tuple[int, in
             why = f"'{shown(text[close + 1 :])}' is not understood"
             return Operand(UnknownValue("KRL001", why), begin, end, None, True)
         return _computed(run, text, begin, end)
-    found = _NAMED.match(text)
-    if found is None:
+    named = _take_name(text)
+    if named is None:
         if text.startswith(b"("):
             return _computed(run, text, begin, end)
         return Operand(UnknownValue("KRL001", "it has no readable target"), begin, end)
-    rest = text[found.end() :]
+    rest = named.rest
     if rest[:1] in (b":", b"+", b"-", b"*", b"/", b"(", b"[", b"."):
         return _computed(run, text, begin, end)
     if rest:
         why = f"'{shown(rest)}' is not understood; it is an inline form without its unfolded lines"
         return Operand(UnknownValue("KRL001", why), begin, end)
-    return _variable(run, found, begin, end)
+    return _variable(run, named, begin, end)
 
 
-def _variable(run: ExecutionContext, found: re.Match[bytes], start: int, end: int) -> Operand:
-    name = found[1].upper()
-    words = shown(found[0])
+class _Named(NamedTuple):
+    """A variable that is named as a target: its name and components (upper case), what is in its brackets, its words in
+    a message, and what follows."""
+
+    name: bytes
+    element: bytes | None
+    path: bytes
+    words: str
+    rest: bytes
+
+
+@kept
+def _take_name(text: bytes) -> _Named | None:
+    found = _NAMED.match(text)
+    if found is None:
+        return None
     path = found[3].replace(b" ", b"").replace(b"\t", b"").upper()
-    if found[2] is not None:
-        run.mentioned |= identifiers(found[2])
-        indices = index_text(found[2], run.lookup)
+    return _Named(found[1].upper(), found[2], path, shown(found[0]), text[found.end() :])
+
+
+def _variable(run: ExecutionContext, named: _Named, start: int, end: int) -> Operand:
+    name, element, path, words, _ = named
+    if element is not None:
+        run.mentioned |= identifiers(element)
+        indices = index_text(element, run.lookup)
         if indices is None:
             run.mentioned.add(name)
             return Operand(
                 UnknownValue("KRL002", f"its target {words} has an index that is not a constant"), start, end
             )
         path = b"[" + indices + b"]" + path
-    value = run.lookup(name, path)
-    line = run.declarations.lines.get(name + path)
     has = run.variables.get(name, path)
+    value = run.resolve(name, path, has)
+    line = run.declarations.lines.get(name + path)
     if run.routine is not None and name in run.routine.types:
         line = None
     variable = PointVariable(name + path, run.type_of(name) if b"." not in path else b"", line, b"")

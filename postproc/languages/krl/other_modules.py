@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 from postproc.base.document import Document
 from postproc.languages.krl.data import (
@@ -16,7 +17,9 @@ from postproc.languages.krl.data import (
     read_references,
 )
 from postproc.languages.krl.lexing import Statement
-from postproc.languages.krl.modal_state import FrameIndex, FrameRegister, ModalState
+from postproc.languages.krl.modal_state import ELSEWHERE, START, FrameIndex, FrameRegister, ModalState
+from postproc.languages.krl.motion_rows import MotionRows
+from postproc.languages.krl.predecessors import expanded
 from postproc.languages.krl.program_structure import ProgramStructure, Routine, closure, program_structure
 from postproc.languages.krl.scan import scan
 from postproc.languages.krl.statement_effects import Effects, is_harmless
@@ -24,6 +27,9 @@ from postproc.languages.krl.target import UnknownValue
 from postproc.languages.krl.variables import Variables
 from postproc.languages.krl.vectorised import Item
 from postproc.toolpath.initial_state import Symbol
+
+if TYPE_CHECKING:
+    from postproc.languages.krl.execution_context import Flow
 
 _APART = re.compile(rb"\$(?:EX_AX_IGNORE|ASYNC_AXIS)[ \t]*+=|\bASY(?:PTP|CONT)\b", re.I)
 MOST_DEPTH = 5
@@ -43,6 +49,9 @@ MODAL_FIELDS = (
     "axis_record",
 )  # fmt: skip
 """What a called routine leaves to its caller, besides variables and the position."""
+POSITION_FIELDS = (
+    "point", "point_frames", "anchor", "point_unknown", "point_line", "axes", "external", "sources",
+)  # fmt: skip
 
 
 @dataclass(eq=False)
@@ -80,6 +89,15 @@ class OtherModule:
         return variables
 
 
+class RoutineExit(NamedTuple):
+    """What a routine of another module leaves, and its frames.  moves: it surely moves the robot (True), surely does
+    not (False), or may (None)."""
+
+    state: ModalState
+    frames: FrameRegister
+    moves: bool | None
+
+
 @dataclass(eq=False)
 class OtherModules:
     """routines: those that other modules may call; effects: what they and what they call change that others know;
@@ -92,7 +110,7 @@ class OtherModules:
     unread: dict[bytes, tuple[bytes, ...]] = field(default_factory=dict)
     assigned: set[bytes] = field(default_factory=set)
     table_entries: set[bytes | None] = field(default_factory=set)
-    outcomes: dict[tuple[bytes, str], tuple[ModalState, FrameRegister] | None] = field(default_factory=dict)
+    outcomes: dict[tuple[bytes, str], RoutineExit | None] = field(default_factory=dict)
     steps: int = 0
 
     def share(self, survey: ProgramStructure, own: Set[bytes]) -> None:
@@ -205,11 +223,22 @@ def state_at_entry(state: ModalState, frames: FrameRegister, inner: FrameRegiste
     return entry
 
 
+def exit_of(flow: Flow | None, frames: FrameRegister, rows: MotionRows) -> RoutineExit | None:
+    """What holds where a routine returns; rows: its motions."""
+    if flow is None:
+        return None
+    state, sources = flow.state, expanded(rows, flow.state.sources)
+    moves = None if START in sources else True
+    if sources == {START} and state.point_unknown == ModalState.point_unknown:
+        moves = False
+    return RoutineExit(state, frames, moves)
+
+
 def take_exit(
-    state: ModalState, exit: ModalState, registers: tuple[FrameRegister, FrameRegister], why: str, line: int
+    state: ModalState, before: ModalState, left: RoutineExit, frames: FrameRegister, why: str, line: int
 ) -> None:
-    """Goes on with what a called routine left; registers: of the caller and of the routine."""
-    frames, inner = registers
+    """Goes on with what a called routine left; before: what held before the call; frames: those of the caller."""
+    exit, inner = left.state, left.frames
     entry = state.base, state.tool
     for name in MODAL_FIELDS:
         setattr(state, name, getattr(exit, name))
@@ -222,6 +251,25 @@ def take_exit(
         state.tool = (
             entry[1] if entry[1] == exit.tool else UnknownValue("KRL005", f"$TOOL is not known {why}")
         )
+    if left.moves is False:
+        for name in POSITION_FIELDS:
+            setattr(state, name, getattr(before, name))
+    elif left.moves:
+        _take_position(
+            state, exit, [_moved(one, inner, frames, line) for one in exit.point_frames or ()], line
+        )
+
+
+def _take_position(
+    state: ModalState, exit: ModalState, point_frames: list[FrameIndex | UnknownValue], line: int
+) -> None:
+    """Where the last motion of a routine ended, which nothing corrects; point_frames: its base and tool."""
+    state.sources = frozenset([ELSEWHERE])
+    state.axes = exit.axes
+    if exit.point is not None and len(point_frames) == 2:
+        base, tool = point_frames
+        if isinstance(base, FrameIndex) and isinstance(tool, FrameIndex):
+            state.point, state.point_frames, state.point_line = exit.point, (base, tool), line
 
 
 def _moved(

@@ -34,11 +34,13 @@ from postproc.languages.krl.other_modules import (
     MOST_DEPTH,
     MOST_OUTCOMES,
     MOST_STEPS,
+    RoutineExit,
+    exit_of,
     state_at_entry,
     visible,
 )
 from postproc.languages.krl.program_structure import INLINE, LATER, Routine, closure
-from postproc.languages.krl.statement_effects import EVERYTHING, HIDDEN, effects_of
+from postproc.languages.krl.statement_effects import EVERYTHING, HIDDEN, effects_of, effects_of_unknown
 from postproc.languages.krl.vectorised import Item, VectorisedLines
 from postproc.toolpath import Annotation
 
@@ -88,9 +90,7 @@ class ProgramFlow(Calls):
             pc = self._step(pc)
         return run.merged(self.activations[-1].returned, self._here())
 
-    def _exit_of(
-        self, name: bytes, state: ModalState, given: tuple[Value | None, ...]
-    ) -> tuple[ModalState, FrameRegister] | None:
+    def _exit_of(self, name: bytes, state: ModalState, given: tuple[Value | None, ...]) -> RoutineExit | None:
         run = self.run
         others = run.others
         module, routine = others.routines[name]
@@ -112,7 +112,7 @@ class ProgramFlow(Calls):
                 following = ProgramFlow(inner, Unfollowed())
                 with contextlib.suppress(Restart):
                     flow = following.outcome(routine, given)
-                    others.outcomes[key] = None if flow is None else (flow.state, register)
+                    others.outcomes[key] = exit_of(flow, register, inner.rows)
                 others.steps += following.steps + len(module.declarations.types)
         return others.outcomes[key]
 
@@ -196,9 +196,16 @@ class ProgramFlow(Calls):
         kind, said = item.kind, item.strings
         if kind == "comment":
             return pc + 1
+        if kind == "motion" and b"(" not in item.code and pc not in run.survey.events:
+            run.variables.line = item.line
+            motions.move(run, item)
+            return pc + 1
         if not item.code.isascii() and kind != "motion" and has_foreign_letters(item.code):
             self._report_letters(item)
         run.variables.line = item.line
+        if item.code in run.survey.ill_formed:
+            why = f"after line {item.line}, which is not understood"
+            run.forget(effects_of_unknown(item.code), why)
         if b"(" in item.code:
             self._call_functions(item)
         if pc in run.survey.events:

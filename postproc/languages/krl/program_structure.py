@@ -29,11 +29,14 @@ from postproc.languages.krl.statement_effects import (
     Effects,
     declared_external,
     effects_of,
+    effects_of_unknown,
+    entries_given,
     functions_of,
     is_harmless,
     read_by,
     returned_by,
 )
+from postproc.languages.krl.statement_forms import is_well_formed
 
 NO_EFFECTS: Mapping[bytes, Effects] = MappingProxyType({})
 NO_DIRECTIONS: Directions = MappingProxyType({})
@@ -99,7 +102,8 @@ class ProgramStructure:
     names that run or change at a time of their own (interrupts, triggers); ``later_effects``: what these
     change of base, tool and modes; ``inline``: lines of motions in the fold of an inline form; ``jumps``:
     start of the routine and name of every label that a GOTO names -> first and last index of these;
-    ``effects``: all that the program changes anywhere; ``blocks``: all of them; ``directions``: name of a routine ->
+    ``effects``: all that the program changes anywhere; ``blocks``: all of them; ``ill_formed``: the code of statements
+    with words that have no meaning there; ``directions``: name of a routine ->
     of each parameter whether it comes back changed.
     """
 
@@ -113,6 +117,7 @@ class ProgramStructure:
     later_effects: Effects = field(default_factory=set)
     jumps: dict[tuple[int, bytes], tuple[int, int]] = field(default_factory=dict)
     blocks: list[Block] = field(default_factory=list)
+    ill_formed: set[bytes] = field(default_factory=set)
     effects: Effects = field(default_factory=set)
     inline: set[int] = field(default_factory=set)
     unclosed: list[tuple[int, str]] = field(default_factory=list)
@@ -137,6 +142,10 @@ class _Surveyor:
 
     def take(self, index: int, statement: Statement) -> None:
         kind, stack = statement.kind, self.stack
+        if kind not in ("motion", "comment") and not is_well_formed(statement):
+            self._ill_formed(statement)
+        if stack and stack[-1].word == b"SWITCH" and not stack[-1].branches:
+            self._before_first_case(statement)
         if kind == "motion":
             if stack and not _stays(statement.code):
                 stack[-1].effects.add("point")
@@ -159,6 +168,8 @@ class _Surveyor:
         elif kind == "branch":
             self.note(statement)
             if not self.buried and stack and stack[-1].word == BRANCHES[statement.word]:
+                if statement.code in self.found.ill_formed or functions_of(statement):
+                    stack[-1].broken = True  # `ELSE IF` opens no block, and a CASE calls nothing
                 stack[-1].branches.append(index)
                 self.found.events[index] = [("branch", stack[-1])]
         elif kind == "close":
@@ -178,6 +189,24 @@ class _Surveyor:
             if statement.word == b"ELSEIF" and stack:
                 stack[-1].broken = True  # no KRL, and no end of what is before it
             self.note(statement)
+
+    def _ill_formed(self, statement: Statement) -> None:
+        found, code = self.found, statement.code
+        if code in found.ill_formed:
+            effects = effects_of_unknown(code) if self.stack else set()
+        else:
+            found.ill_formed.add(code)
+            effects = effects_of_unknown(code)
+            found.assigned.update(effect for effect in effects if isinstance(effect, bytes))
+            _join(found.effects, effects)
+        if self.stack:
+            _join(self.stack[-1].effects, effects)
+
+    def _before_first_case(self, statement: Statement) -> None:
+        block = self.stack[-1]
+        if not block.broken and statement.kind not in ("comment", "branch", "close", "end", "def"):
+            block.broken = True
+            self.found.unclosed.append((statement.line, "a statement is between SWITCH and its first CASE"))
 
     def _fold(self, comment: bytes) -> None:
         found = _FOLD.match(comment)
@@ -289,6 +318,8 @@ class _Surveyor:
             found.assigned.add(said.name + b"." + said.path)
         else:
             found.assigned.update(effect for effect in effects if isinstance(effect, bytes))
+        if isinstance(said, Call) and not effects.isdisjoint(FRAME_TABLES):
+            found.table_entries |= entries_given(said)
         if isinstance(said, Declared) and self.routine is not None:
             for key, _, _ in said.items:
                 if key is not None:
@@ -297,7 +328,9 @@ class _Surveyor:
         if statement.word in (b"INTERRUPT", b"TRIGGER", b"GLOBAL"):
             for name, given in LATER.findall(statement.code):
                 call = Call(name.upper(), given)
-                found.later |= {call.name, *returned_by(call, found.directions)}
+                changed = returned_by(call, found.directions)
+                found.later |= {call.name, *(effect for effect in changed if isinstance(effect, bytes))}
+                found.later_effects |= {effect for effect in changed if isinstance(effect, str)}
         if stack:
             _join(stack[-1].effects, effects)
             stack[-1].calls.update(functions)
@@ -327,7 +360,7 @@ def program_structure(
                 block.has_labels = True
                 block.is_entered = block.is_entered or not block.start < first <= last < block.end
     _settle(found, surveyor.blocks, others)
-    found.later_effects = {SYSTEM[name] for name in found.later if name in SYSTEM}
+    found.later_effects |= {SYSTEM[name] for name in found.later if name in SYSTEM}
     for name in [*closure(found, found.later), *(found.later & others.keys())]:
         effects = found.routines[name].effects if name in found.routines else others[name]
         found.later_effects |= {effect for effect in effects if isinstance(effect, str)}

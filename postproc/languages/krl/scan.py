@@ -20,7 +20,7 @@ from postproc.base.batches import in_blocks
 from postproc.base.decimals import literals
 from postproc.base.document import BLOCK, Document, offset_type
 from postproc.languages.krl.external_axes import UNSTATED, six
-from postproc.languages.krl.lexing import statement
+from postproc.languages.krl.lexing import Statement, statement
 from postproc.languages.krl.spatial import Numbers
 from postproc.languages.krl.target import COMPONENTS, KrlTarget, parse
 from postproc.languages.krl.vectorised import Item, VectorisedLines
@@ -49,7 +49,19 @@ _IN_NUMBER[list(b"0123456789.+-")] = True
 
 
 def scan(document: Document, fast: bool) -> Iterator[Item]:
-    """The statements of a program in the order of the text; ``fast``: runs of common lines as one."""
+    """The statements of a program in the order of the text, without its header; ``fast``: runs of common lines as
+    one."""
+    items = _items(document, fast)
+    for item in items:
+        if isinstance(item, Statement) and item.kind == "header":
+            continue
+        yield item
+        if not isinstance(item, Statement) or item.kind != "comment":
+            break
+    yield from items
+
+
+def _items(document: Document, fast: bool) -> Iterator[Item]:
     raw = document.raw
     store = ArrayStore()
     line, place = 1, len(BOM_UTF8) if document.raw.startswith(BOM_UTF8) else 0

@@ -7,18 +7,18 @@ variable that the program assigns) or the name (bytes) of a variable that is ass
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Set
+from collections.abc import Iterable, Mapping, Set
 from types import MappingProxyType
 
 from postproc.languages.krl.lexing import (
     NAME,
-    SPLINES,
     Assignment,
     Call,
     Declared,
     Statement,
     identifiers,
     kept,
+    keyed,
     split_values,
     without_strings,
 )
@@ -62,17 +62,24 @@ _WORDS = frozenset(
     b"AND OR NOT EXOR B_AND B_OR B_NOT B_EXOR IF THEN WHILE UNTIL FOR TO STEP SWITCH CASE WAIT SEC RETURN".split()
 )
 _IN_MOTIONS = frozenset([b"CA", b"WITH", b"BAS"])
-_CALLING = frozenset(["assignment", "call", "foreign", "open", "close", "return", "motion"])
-"""Kinds of statement whose expressions may call functions, besides WAIT."""
+_CALLING = frozenset(
+    ["assignment", "branch", "call", "declaration", "foreign", "open", "close", "return", "motion"]
+)
+"""Kinds of statement whose expressions may call functions, besides the words below."""
+_EVALUATING = frozenset([b"WAIT", b"TRIGGER", b"ANOUT", b"ANIN"])
+_DO = re.compile(rb"(?<![A-Za-z0-9_$])DO(?![A-Za-z0-9_$])", re.I)
 
 _COUNTER = re.compile(rb"FOR[ \t]+(" + NAME + rb")[ \t]*=", re.I)
 _KEYS = frozenset([*COMPONENTS, *AXES, *EXTERNAL, b"S", b"T"])
 
-_INDEX = rb"(?:\[[^\]]*+\][ \t]*+)?"
+_INDEX = rb"(?:\[(?:[^\[\]]|\[[^\[\]]*+\])*+\][ \t]*+)?"
 _RETURNED = re.compile(
     rb"[ \t]*+(" + NAME + rb")[ \t]*+" + _INDEX + rb"(?:\.[ \t]*+" + NAME + rb"[ \t]*+" + _INDEX + rb")*+\Z"
 )
+_ENTRY = re.compile(rb"[ \t]*+((?:BASE|TOOL)_DATA)[ \t]*+(?:\[([^\[\]]*+)\])?+", re.I)
 _DIMENSIONS = re.compile(rb"\[[^\]\[]*+\]")
+_APART = re.compile(rb"\$[ \t]++")
+_ASSIGNED = re.compile(rb"(?<![A-Za-z0-9_$.])(" + NAME + rb")[ \t]*+(?:[\[.][^=]{0,200}+)?+=(?!=)")
 _EXTERNAL = re.compile(
     rb"EXT(?:FCT[ \t]++" + NAME + rb"(?:\[[^\]]*+\])?|P)?+[ \t]++(" + NAME + rb")[ \t]*+\(([^)]*+)\)", re.I
 )
@@ -120,12 +127,14 @@ def is_harmless(name: bytes) -> bool:
 
 def functions_of(statement: Statement) -> tuple[bytes, ...]:
     """The functions that the expressions of a statement call, those of KRL itself left out; upper case."""
-    if statement.kind not in _CALLING and statement.word != b"WAIT":
+    if statement.kind not in _CALLING and statement.word not in _EVALUATING:
         return ()
-    if b"(" not in statement.code or statement.word in SPLINES:
+    if b"(" not in statement.code:
         return ()
     said = statement.strings
     code = said.arguments if isinstance(said, Call) else statement.code
+    if statement.word == b"TRIGGER":
+        code = _DO.split(code, 1)[0]  # what it does later is looked at elsewhere
     if b"(" not in code:
         return ()
     if statement.kind == "motion":
@@ -171,15 +180,42 @@ def directions(parameters: bytes) -> tuple[bool, ...]:
     return tuple(not part.rstrip().upper().endswith(b"IN") for part in parts)
 
 
-def returned_by(said: Call, known: Directions) -> frozenset[bytes]:
-    """The variables that a call may give other values: what is no expression and handed over other than as IN."""
+def as_effects(names: Iterable[bytes]) -> Effects:
+    """What it changes where these variables change; of those of the controller what they decide."""
+    return {SYSTEM.get(name, name) for name in names}
+
+
+def effects_of_unknown(code: bytes) -> Effects:
+    """What a statement with words that have no meaning there may change, as far as its names say."""
+    text = _APART.sub(b"$", without_strings(code))
+    names = identifiers(text)
+    effects = as_effects(name.upper() for name in _ASSIGNED.findall(text))
+    effects |= {SYSTEM[name] for name in names if name in SYSTEM}
+    functions = [name for name in _functions(text) if not is_harmless(name)]
+    if functions:
+        effects |= as_effects(names)
+    if functions or HIDDEN.search(text):
+        effects.add("point")
+    return effects | MODAL if b"BAS" in names else effects
+
+
+def returned_by(said: Call, known: Directions) -> frozenset[Effect]:
+    """What a call may change: of what is handed over other than as IN, and is no expression."""
+    if not said.arguments:
+        return frozenset()
     comes_back = known.get(said.name, ())
     names = set()
     for i, text in enumerate(split_values(said.arguments)):
         found = _RETURNED.match(text)
         if found and (i >= len(comes_back) or comes_back[i]):
             names.add(found[1].upper())
-    return frozenset(names)
+    return frozenset(as_effects(names))
+
+
+def entries_given(said: Call) -> set[bytes | None]:
+    """The entries of BASE_DATA and TOOL_DATA that are handed over; None for one whose number is computed."""
+    places = filter(None, map(_ENTRY.match, split_values(said.arguments)))
+    return {None if found[2] is None else keyed(found[1].upper(), found[2]) for found in places}
 
 
 def effects_of(statement: Statement, known: Directions = MappingProxyType({})) -> tuple[Effects, bytes]:

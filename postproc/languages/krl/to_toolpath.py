@@ -14,7 +14,7 @@ from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
 from postproc.languages.krl.controller_data import with_declared
 from postproc.languages.krl.execution_context import ExecutionContext
-from postproc.languages.krl.modal_state import Source
+from postproc.languages.krl.modal_state import ELSEWHERE, Source
 from postproc.languages.krl.motion_rows import MotionRows, RowRefusal
 from postproc.languages.krl.motion_table import MotionTable, Spots
 from postproc.languages.krl.predecessors import continuous, expanded, predecessors, single_sources
@@ -181,9 +181,10 @@ def _refuse_several_starts(rows: MotionRows, table: MotionTable, single: Bools) 
             continue
         code = "KRL009" if kind == Kind.CIRC else "KRL008" if row in rows.relative else "KRL004"
         what = {"KRL009": "its start", "KRL008": "what it is relative to", "KRL004": "what it omits"}[code]
-        rows.reasons[row] = RowRefusal(
-            code, f"several motions may precede it, and {what} is corrected with them"
-        )
+        why = f"several motions may precede it, and {what} is corrected with them"
+        if rows.sources_of[row] == frozenset([ELSEWHERE]):
+            why = f"a motion of another file precedes it, and {what} is not corrected with it"
+        rows.reasons[row] = RowRefusal(code, why)
         rows.builds_on[row] = rows.sources_of[row]
 
 

@@ -43,6 +43,7 @@ class Variables:
         self.mixed: set[bytes] = set()
         self.asked: set[bytes] = set()
         self._paths = KeyNumbers()
+        self._nothing = PersistentMap(self._paths)
         self.facts = VariableFacts(PersistentMap(KeyNumbers()), None)
 
     def get(self, name: bytes, path: bytes = b"") -> Value | None:
@@ -53,7 +54,7 @@ class Variables:
     def set(self, name: bytes, path: bytes, value: Value) -> None:
         if not path:
             # The value of the whole takes the place of all of its parts.
-            self._put(name, PersistentMap(self._paths).set(b"", Fact(value, self.line)))
+            self._put(name, self._nothing.set(b"", Fact(value, self.line)))
             return
         entry = self.facts.names.get(name)
         if entry is None:
@@ -129,7 +130,7 @@ class Variables:
         return Fact(UnknownValue("KRL002", f"{shown(name + path)} varies: {places}"), 0)
 
     def _entry(self, values: Entry, line: int) -> PersistentMap:
-        entry = PersistentMap(self._paths)
+        entry = self._nothing
         for path, value in values.items():
             entry = entry.set(path, Fact(value, line))
         return entry
