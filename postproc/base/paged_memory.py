@@ -299,7 +299,9 @@ def _folder(room: int, program: Path) -> str | None:
         if most >= room:
             return name
     if _free_memory() < room:
-        message = f"the disk has {most / 1e9:.1f} GB free, and this program needs up to {room / 1e9:.1f} GB there"
+        message = (
+            f"the disk has {most / 1e9:.1f} GB free, and this program needs up to {room / 1e9:.1f} GB there"
+        )
         help = f"free room in {names[0]}, or set TMPDIR to a folder on a disk that has it"
         raise Refusal(Finding("FIL013", message, str(program), help=help))
     return None
