@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from postproc.base import input_files, yaml_section
+from postproc.base import input_files, paged_memory, yaml_section
 from postproc.base.findings import Code
 from postproc.batching import codes as batch
 from postproc.cell import codes as cell
@@ -31,6 +31,7 @@ TABLES: tuple[Mapping[str, Code], ...] = tuple(
     room.CODES
     for room in (
         input_files,
+        paged_memory,
         atomic_write,
         yaml_section,
         cell,

@@ -34,17 +34,24 @@ class ArrayStore:
 
 
 class GrowingColumns:
-    """Columns that grow at their ends, in place: the parts of a long one would leave holes in the memory."""
+    """Columns that grow at their ends, in place: the parts of a long one would leave holes in the memory.  What is
+    large becomes an array, as only those lie in files where a program is larger than memory."""
 
     def __init__(self, *types: Any) -> None:
         self._types, self._bytes = types, [bytearray() for _ in types]
+        self._arrays: list[list[NDArray[Any]]] = [[] for _ in types]
 
     def add(self, *columns: NDArray[Any]) -> None:
         """Append ``columns`` (K,) to those that are here, one to each."""
-        for buffer, values, kind in zip(self._bytes, columns, self._types, strict=True):
-            buffer += np.ascontiguousarray(values, kind).data
+        for k, (values, kind) in enumerate(zip(columns, self._types, strict=True)):
+            self._bytes[k] += np.ascontiguousarray(values, kind).data
+            if len(self._bytes[k]) > ArrayStore.SIZE:
+                self._arrays[k].append(np.frombuffer(self._bytes[k], kind).copy())
+                self._bytes[k] = bytearray()
 
     def done(self) -> Iterator[NDArray[Any]]:
         """The columns (N,) as they are now."""
-        for buffer, kind in zip(self._bytes, self._types, strict=True):
-            yield np.frombuffer(buffer, kind)
+        for buffer, arrays, kind in zip(self._bytes, self._arrays, self._types, strict=True):
+            last = np.frombuffer(buffer, kind)
+            yield np.concatenate([*arrays, last]) if arrays else last
+            arrays.clear()

@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
+from postproc.base.paged_memory import release_pages, with_small_arrays
+
 T = TypeVar("T")
 
 ROWS = 3 << 12
@@ -51,8 +53,13 @@ def in_blocks(work: Callable[[slice], T], count: int, rows: int = 0) -> Iterator
     What ``work`` raises is raised here; blocks that have not started are then given up.
     """
     parts, workers = blocks(count, rows), threads()
-    if len(parts) < 2 or workers < 2 or getattr(_inside, "block", False):
+    if len(parts) < 2 or getattr(_inside, "block", False):
         yield from map(work, parts)
+        return
+    if workers < 2:
+        for part in parts:
+            yield with_small_arrays(work, part)
+            release_pages()
         return
 
     def within(part: slice) -> T:
@@ -66,6 +73,7 @@ def in_blocks(work: Callable[[slice], T], count: int, rows: int = 0) -> Iterator
                 ahead.append(pool.submit(within, part))
                 if len(ahead) > workers:
                     yield ahead.popleft().result()
+                    release_pages()
             while ahead:
                 yield ahead.popleft().result()
         finally:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from postproc.base.array_storage import ArrayStore
 from postproc.base.arrays import Ints, sums
+from postproc.base.paged_memory import in_file
 
 Offsets = NDArray[np.signedinteger]
 """Byte offsets; 32 bits where they fit."""
@@ -142,7 +143,7 @@ class Edits(Sequence[Edit]):
         columns = _in_columns(chain((first, second), rest))
         del first, second
         edits = Edits.__new__(Edits)
-        edits.texts = b"".join([column.data for column in columns.pop()])
+        edits.texts = in_file(b"".join([column.data for column in columns.pop()]))
         edits.ends = sums(np.concatenate(columns.pop()), offset_type(len(edits.texts)))
         edits.stop = np.concatenate(columns.pop())
         edits.start = np.concatenate(columns.pop())
@@ -239,7 +240,7 @@ def _rearranged(texts: bytes, ends: NDArray[Any], order: Ints) -> tuple[bytes, O
         bounds = runs[low : low + BLOCK // 8 + 1]
         first, last = ends[order[bounds[:-1]]], ends[order[bounds[1:] - 1] + 1]
         rearranged.writelines(view[a:b] for a, b in zip(first.tolist(), last.tolist(), strict=True))
-    return rearranged.getvalue(), arranged
+    return in_file(rearranged.getvalue()), arranged
 
 
 def _sized(size: int) -> io.BytesIO:
@@ -293,7 +294,7 @@ def apply(document: Document, edits: Iterable[Edit]) -> bytes:
         )
         at = block_end
     written.write(memoryview(raw)[at:])
-    return written.getvalue()
+    return in_file(written.getvalue())
 
 
 def _disorder(edits: Edits, size: int) -> int:

@@ -11,6 +11,7 @@ from typing import BinaryIO
 
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import note, provided_content
+from postproc.base.paged_memory import in_file
 
 MAX_BYTES = 1_000_000_000
 """Sixteen million motions; offsets in a program have 32 bits."""
@@ -73,7 +74,7 @@ def _read(path: Path, largest: int | None, take: Callable[[BinaryIO], bytes]) ->
         if largest is not None and status.st_size > largest:
             raise OSError(f"it is larger than {largest} bytes")
         with path.open("rb") as stream:
-            raw = take(stream)
+            raw = in_file(take(stream))
     except (OSError, ValueError) as error:  # ValueError: a name with NUL
         why = getattr(error, "strerror", None) or error
         raise Refusal(Finding("FIL001", f"the file cannot be read: {why}", str(path))) from None

@@ -17,6 +17,7 @@ import numpy as np
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import place
 from postproc.base.memory import release_free_memory
+from postproc.base.paged_memory import large_arrays_in_files
 from postproc.base.units import MM
 from postproc.compensation.axis_limits import check_limits
 from postproc.compensation.corner_fit import corners_not_improved, fit_corners
@@ -57,6 +58,11 @@ LEAST = 200
 
 def predict(request: Request, stage: Stage = silent) -> Report:
     """The deflection at every pose; files only where ``report`` names a folder for them."""
+    with large_arrays_in_files(request.program):
+        return _predict(request, stage)
+
+
+def _predict(request: Request, stage: Stage) -> Report:
     ready = prepare(request)
     stage("predicting")
     result = correct(replace(ready.task, gain=0.0))
@@ -89,6 +95,11 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
 
     ``stage`` is called with what is being done.  Raises Refusal, and has then written nothing.
     """
+    with large_arrays_in_files(request.program):
+        return _compensate(request, stage)
+
+
+def _compensate(request: Request, stage: Stage) -> Report:
     ready = prepare(request)
     program = ready.program
     if program.marker is not None and not request.allow_compensated:

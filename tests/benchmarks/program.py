@@ -28,7 +28,7 @@ EXPONENT = 1.05
 WALL = {1_000_000: 20.0, 100_000: 3.0}
 """[s] Goals by the clock for whole runs, by size."""
 
-MEMORY = {1_000_000: 1000.0}
+MEMORY = {1_000_000: 800.0, 3_000_000: 1500.0, 10_000_000: 1500.0}
 """[MB] Goals."""
 
 SMALL, SMALL_WALL = 2000, 1.0

@@ -1,0 +1,137 @@
+"""numpy's own interface for the memory of arrays (NEP 49, ``PyDataMem_SetHandler``), without a compiler.
+
+A handler holds for one context: threads that work on blocks, whose arrays are small, allocate as always.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from functools import cache
+from types import FrameType
+from typing import Any, Protocol
+
+SET_HANDLER = 304
+"""Number of ``PyDataMem_SetHandler`` in numpy's table of functions (numpy/__multiarray_api.h); it never changes."""
+
+_NAME = b"mem_handler"
+
+_MALLOC = ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t
+_CALLOC = ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_size_t
+_REALLOC = ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t
+_FREE = None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t
+
+_for_ever: list[Any] = []
+"""Handlers: an array may outlive all else."""
+
+_codes: set[Any] = set()
+"""The code of the functions that numpy calls."""
+
+
+class Place(Protocol):
+    """Where large arrays lie."""
+
+    least: int
+    """Bytes of an array that belongs here."""
+
+    def new(self, size: int, zeros: bool) -> int:
+        """The address of ``size`` bytes, which are 0 if ``zeros``; 0 where there is no room for them."""
+
+    def size_at(self, address: int) -> int:
+        """Bytes of what is at ``address``; 0 where nothing of this place is."""
+
+    def give_back(self, address: int) -> bool:
+        """Whether something of this place was at ``address``, which is free from now on."""
+
+
+class _Allocator(ctypes.Structure):
+    """``PyDataMemAllocator`` of numpy/ndarraytypes.h."""
+
+    _fields_ = [(name, ctypes.c_void_p) for name in ("ctx", "malloc", "calloc", "realloc", "free")]
+
+
+class _Handler(ctypes.Structure):
+    """``PyDataMem_Handler`` of numpy/ndarraytypes.h."""
+
+    _fields_ = [("name", ctypes.c_char * 127), ("version", ctypes.c_uint8), ("allocator", _Allocator)]
+
+
+_new_capsule = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p)(
+    ("PyCapsule_New", ctypes.pythonapi)
+)
+_address_in = ctypes.PYFUNCTYPE(ctypes.c_void_p, ctypes.py_object, ctypes.c_char_p)(
+    ("PyCapsule_GetPointer", ctypes.pythonapi)
+)
+
+
+def set_handler(handler: Any) -> Any:
+    """Makes ``handler`` that of this context, None: numpy's own; returns the one before."""
+    return _set_handler()(None if handler is None else id(handler))
+
+
+def handler_for(place: Place) -> Any:
+    """A handler that puts large arrays into ``place``, and all others where numpy puts them."""
+    before = set_handler(None)
+    usual = _Handler.from_address(_address_in(set_handler(before), _NAME)).allocator
+    # numpy's own functions expect the lock of the interpreter, which PYFUNCTYPE keeps
+    malloc = ctypes.PYFUNCTYPE(*_MALLOC)(usual.malloc)
+    calloc = ctypes.PYFUNCTYPE(*_CALLOC)(usual.calloc)
+    realloc = ctypes.PYFUNCTYPE(*_REALLOC)(usual.realloc)
+    free = ctypes.PYFUNCTYPE(*_FREE)(usual.free)
+    # bound here: at the end of the process the names of modules may be gone before the last array
+    new, size_at, give_back, least, move = (
+        place.new,
+        place.size_at,
+        place.give_back,
+        place.least,
+        ctypes.memmove,
+    )
+
+    def allocate(_: int | None, size: int) -> int | None:
+        return (size >= least and new(size, False)) or malloc(None, size)
+
+    def allocate_zeros(_: int | None, count: int, size: int) -> int | None:
+        return (count * size >= least and new(count * size, True)) or calloc(None, count, size)
+
+    def change_size(_: int | None, address: int, size: int) -> int | None:
+        old = size_at(address)
+        if not old:
+            same: int | None = realloc(None, address, size)
+            return same
+        there = allocate(None, size)
+        if there is not None:
+            move(there, address, min(size, old))
+            give_back(address)
+        return there
+
+    def release(_: int | None, address: int, size: int) -> None:
+        if not give_back(address):
+            free(None, address, size)
+
+    functions = (allocate, _MALLOC), (allocate_zeros, _CALLOC), (change_size, _REALLOC), (release, _FREE)
+    calls = [ctypes.CFUNCTYPE(*types)(function) for function, types in functions]
+    addresses = (ctypes.cast(call, ctypes.c_void_p).value for call in calls)
+    handler = _Handler(b"postproc_files", 1, _Allocator(None, *addresses))
+    _codes.update(function.__code__ for function, _ in functions)
+    _for_ever.append((handler, calls))
+    return _new_capsule(ctypes.addressof(handler), _NAME, None)
+
+
+def is_allocating(frame: FrameType | None) -> bool:
+    """Whether a frame belongs to what numpy called for memory: an exception would be lost there."""
+    while frame is not None:
+        if frame.f_code in _codes:
+            return True
+        frame = frame.f_back
+    return False
+
+
+@cache
+def _set_handler() -> Callable[[int | None], Any]:
+    from numpy._core.multiarray import _ARRAY_API
+
+    table = ctypes.cast(_address_in(_ARRAY_API, None), ctypes.POINTER(ctypes.c_void_p))
+    function: Callable[[int | None], Any] = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p)(
+        table[SET_HANDLER]
+    )
+    return function

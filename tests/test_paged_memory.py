@@ -1,0 +1,209 @@
+"""Programs larger than memory: arrays in temporary files, blocks of any size and any number of threads give the same
+bytes; nothing of the files stays, and a signal is heard."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy._core.multiarray import get_handler_name
+
+from postproc import api
+from postproc.base import batches, paged_memory
+from postproc.base.array_storage import ArrayStore, GrowingColumns
+from postproc.base.findings import Refusal
+
+SAMPLES = Path(__file__).parents[1] / "samples"
+PROGRAMS = (
+    "irb6700_pocket/pocket.mod",
+    "m900ib_pocket/pocket.ls",
+    "kr270_pocket/pocket.ngc",
+)
+FILES = "postproc_files"
+"""numpy's name of the handler."""
+
+
+@pytest.fixture
+def small(monkeypatch, tmp_path_factory):
+    """Every program is a large one, every array of some rows too, and their pages are given back all the time."""
+    monkeypatch.setattr(paged_memory, "PROGRAM", 0)
+    monkeypatch.setattr(paged_memory, "LARGE", 1 << 11)
+    monkeypatch.setattr(paged_memory, "RESIDENT", 0)
+    monkeypatch.setattr(paged_memory, "WAITING", 8 << 20)
+    folder = tmp_path_factory.mktemp("room")
+    monkeypatch.setattr(paged_memory, "_folder", lambda room, program: str(folder))
+    return folder
+
+
+def results(program: Path, output: Path) -> dict[str, bytes]:
+    """All files of a run, without the paths in them."""
+    shutil.rmtree(output, ignore_errors=True)
+    api.compensate(program, force=True, output=output / program.name)
+    folder = str(output).encode()
+    return {path.name: path.read_bytes().replace(folder, b"") for path in sorted(output.iterdir())}
+
+
+def set_blocks(monkeypatch, rows: int, threads: int) -> None:
+    monkeypatch.setattr(batches, "ROWS", rows)
+    monkeypatch.setenv(batches.THREADS, str(threads))
+
+
+@pytest.mark.slow
+def test_files_blocks_and_threads_change_no_byte(tmp_path, monkeypatch, request):
+    program = SAMPLES / "kr270_taught" / "taught.src"
+    expected = results(program, tmp_path / "one" / "of")
+    room = request.getfixturevalue("small")
+    for rows, threads in ((1, 2), (7, 1), (4096, 4)):
+        set_blocks(monkeypatch, rows, threads)
+        assert results(program, tmp_path / "one" / "of") == expected
+    assert os.listdir(room) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_samples_have_the_same_bytes(name, tmp_path, monkeypatch, request):
+    shutil.copytree(SAMPLES / Path(name).parent, tmp_path / "sample")
+    program = tmp_path / "sample" / Path(name).name
+    expected = results(program, tmp_path / "one")
+    request.getfixturevalue("small")
+    for rows, threads in ((7, 2), (4096, 4)):
+        set_blocks(monkeypatch, rows, threads)
+        assert results(program, tmp_path / "one") == expected
+
+
+def test_large_arrays_lie_in_files_and_outlive_the_run(small):
+    with paged_memory.large_arrays_in_files(Path(__file__)):
+        large, zeros = np.arange(100_000), np.zeros(100_000)
+        storage = paged_memory._storage.get()
+        assert get_handler_name(large) == get_handler_name(zeros) == FILES
+        assert {large.ctypes.data, zeros.ctypes.data} <= set(storage.files)
+        assert np.arange(10).ctypes.data not in storage.files
+        more = large.copy()
+        more.resize(300_000, refcheck=False)
+        used = np.full(100_000, 7.0)
+        del used
+        again = np.zeros(100_000)
+        paged_memory.release_pages()
+        assert not again.any(), "the place of an array that is free has its old content"
+        inside = paged_memory.with_small_arrays(lambda _: np.arange(100_000), None)
+    assert get_handler_name(inside) == get_handler_name(np.arange(3)) == "default_allocator"
+    assert np.array_equal(large, np.arange(100_000))
+    assert np.array_equal(more[:100_000], large)
+    assert not more[100_000:].any()
+    count = len(storage.files)
+    del large
+    assert len(storage.files) == count - 1
+    assert os.listdir(small) == []
+
+
+def test_bytes_move_into_a_file_and_stay_what_they_are(small):
+    size = 40 << 20  # the C library keeps what is so large in a mapping of its own
+    text = bytes(range(256)) * (size // 256)
+    copy = bytearray(text)
+    with paged_memory.large_arrays_in_files(Path(__file__)):
+        assert paged_memory.in_file(text) is text
+        storage = paged_memory._storage.get()
+        if not storage.moved:
+            pytest.skip("this C library has no such mapping")
+        paged_memory.release_pages()
+        assert text == copy
+        assert paged_memory.in_file(text) is text
+        assert len(storage.moved) == 1
+    assert text == copy
+
+
+def test_a_small_program_stays_in_memory(tmp_path):
+    program = tmp_path / "part.src"
+    program.write_bytes(b"END\n")
+    with paged_memory.large_arrays_in_files(program):
+        assert get_handler_name(np.arange(10_000_000)) == "default_allocator"
+
+
+def test_a_disk_without_room_leaves_the_array_in_memory(small, monkeypatch):
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "posix_fallocate", full)
+    with paged_memory.large_arrays_in_files(Path(__file__)):
+        array = np.arange(100_000)
+        assert not paged_memory._storage.get().files
+    assert array.sum() == 99_999 * 50_000
+
+
+def test_no_room_anywhere_is_refused_before_anything_is_computed(tmp_path, monkeypatch):
+    monkeypatch.setattr(paged_memory, "PROGRAM", 0)
+    monkeypatch.setattr(paged_memory, "ROOM", 1 << 60)
+    with (
+        pytest.raises(Refusal) as refusal,
+        paged_memory.large_arrays_in_files(Path(__file__)),
+    ):
+        pytest.fail("the run started")
+    assert [finding.code for finding in refusal.value.findings] == ["FIL013"]
+
+
+@pytest.mark.parametrize("call", ["new", "give_back"])
+def test_a_signal_while_memory_is_asked_for_is_heard(small, monkeypatch, call):
+    """An exception out of what numpy calls would be printed and forgotten."""
+    real, done = getattr(paged_memory._Storage, call), []
+
+    def interrupted(storage, *arguments):
+        if not done:
+            done.append(call)
+            signal.raise_signal(signal.SIGINT)
+        return real(storage, *arguments)
+
+    monkeypatch.setattr(paged_memory._Storage, call, interrupted)
+    before = signal.getsignal(signal.SIGINT)
+
+    def run() -> None:
+        with paged_memory.large_arrays_in_files(Path(__file__)):
+            array = np.arange(100_000)
+            del array
+            time.sleep(2.0)
+
+    with pytest.raises(KeyboardInterrupt):
+        run()
+    assert done
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+import numpy as np
+from postproc.base import paged_memory
+paged_memory.PROGRAM = 0
+paged_memory._folder = lambda room, program: sys.argv[1]
+with paged_memory.large_arrays_in_files(Path(sys.argv[1])):
+    array = np.ones(4_000_000)
+    assert paged_memory._storage.get().files
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_nothing_of_the_files_stays_when_the_process_is_killed(tmp_path):
+    with tempfile.TemporaryDirectory(dir=tmp_path) as folder:
+        done = subprocess.run([sys.executable, "-c", KILLED, folder], check=False)
+        assert done.returncode == -signal.SIGKILL
+        assert os.listdir(folder) == []
+
+
+def test_growing_columns_that_are_large(monkeypatch):
+    monkeypatch.setattr(ArrayStore, "SIZE", 1000)
+    columns = GrowingColumns(np.int32, np.float64)
+    for start in range(0, 5000, 70):
+        part = np.arange(start, min(start + 70, 5000))
+        columns.add(part, part / 4)
+    whole = np.arange(5000)
+    one, other = columns.done()
+    assert one.dtype == np.int32
+    assert np.array_equal(one, whole)
+    assert np.array_equal(other, whole / 4)
