@@ -258,7 +258,9 @@ def _published(
     _spare(request, job, parts, [*files, own, *extra, remembered.path])
     applied = result.damped(request.gain)
     inputs = _learned_inputs(job, matched, applied)
-    acting = learned_robot_file(applied, robot, parts, gap, robot_path, at_this_place=True) or content
+    acting = content
+    if request.gain != 1.0 or result.stand_in:
+        acting = learned_robot_file(applied, robot, parts, gap, robot_path, at_this_place=True) or content
     if acting is not None:
         inputs = replace(inputs, robot=robot_of(acting, robot_path))
     following = folder / main.program.name

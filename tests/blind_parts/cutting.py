@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from weakref import WeakKeyDictionary
 
@@ -25,7 +26,7 @@ CORNER = 8.0
 """[mm] along the path from a corner, within which the cutter is in it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Surface:
     """A shop's program and K points of its surface, in mm in the base, with their motions."""
 
@@ -42,9 +43,14 @@ class Surface:
         return Request(self.folder / "part.src", force="")
 
 
+@lru_cache(maxsize=4)
+def _job(folder: Path, program: bytes, cell: bytes) -> CutProgram:
+    return read_job(Request(folder / "part.src", force=""))
+
+
 def surface_of(folder: Path, point: np.ndarray, normal: np.ndarray, feature: list[str]) -> Surface:
     """Points that one motion of the program cuts."""
-    job = read_job(Request(folder / "part.src", force=""))
+    job = _job(folder, (folder / "part.src").read_bytes(), (folder / "cell.yaml").read_bytes())
     base = job.ready.task.base[job.motions.rows[:1]]
     place = base.position + 1e-3 * point @ base.rotation[0].T
     contacts = find_contacts(job.motions, place, normal @ base.rotation[0].T)
@@ -57,6 +63,9 @@ def commands(surface: Surface, program: Path | None) -> Poses | None:
     if program is None:
         return None
     raw = program.read_bytes()
+    known = _SENT.setdefault(surface, {})
+    if raw in known:
+        return known[raw]
     part = MeasuredPart(
         surface.folder / "x.csv", "", surface.point, surface.normal, np.zeros(0), np.zeros(0), (), (), np.zeros(0, int),
         np.zeros(0, int), np.zeros(0), np.zeros(0, int), FREEDOMS, str(program), hashlib.sha256(raw).hexdigest(), False,
@@ -67,7 +76,12 @@ def commands(surface: Surface, program: Path | None) -> Poses | None:
     assert pairing is not None
     poses, lost = commands_at(surface.program.ready, other, pairing, surface.row, surface.share)
     assert not lost.any()
+    known[raw] = poses
     return poses
+
+
+_SENT: WeakKeyDictionary[Surface, dict[bytes, Poses]] = WeakKeyDictionary()
+"""Where programs send the controller at the points of a surface."""
 
 
 def cut(
