@@ -17,7 +17,7 @@ from postproc.base.arrays import Bools, Floats, Ints
 from postproc.learning.candidates import Circumstances, MissingEffect, candidates
 from postproc.learning.causes import Cause, CausePrediction
 from postproc.learning.covariance import Explanation, Layout, SmoothField, choose_surface, without_field
-from postproc.learning.excluded_points import MOST_OUTLIERS, find_outliers
+from postproc.learning.excluded_points import MOST_OUTLIERS, OUTLIERS_EACH, find_outliers
 from postproc.learning.naming import NAMED, probable_set, weigh_effects
 
 ROUNDS = 4
@@ -185,6 +185,18 @@ def attribute(
         verdict,
         standardised,
     )
+
+
+def evidence_of(prediction: CausePrediction, deviation: Floats, layout: Layout) -> float:
+    """Logarithm of the probability of deviations (K,) [m] by the known causes, about their most probable values
+    (Laplace's approximation), outliers at their cost; -inf where nothing can make them."""
+    start, every = prediction.before[0].copy(), np.ones(len(deviation), bool)
+    try:
+        x, kept = _settle(prediction, deviation, layout, start, every, outliers=True)
+        explained = _explained(prediction, deviation, layout, x, kept)
+    except np.linalg.LinAlgError:
+        return -np.inf
+    return explained.evidence + OUTLIERS_EACH * int((~kept).sum())
 
 
 def _differs_from_null(explained: Explanation, count: int) -> bool:

@@ -16,8 +16,8 @@ from postproc.effects import Conditions
 from postproc.learning.measured_part import FREEDOMS, MeasuredPart
 from postproc.learning.touched_points import touched_points
 from postproc.part.contact import find_contacts
-from postproc.workflows.learn_commands import commands_at
-from postproc.workflows.learn_points import CutProgram, cutting_program, read_job
+from postproc.workflows.learn_commands import commands_at, cutting_program
+from postproc.workflows.learn_points import CutProgram, read_job
 from postproc.workflows.preparation import Request
 
 from .truth import SCATTER, Truth
@@ -71,7 +71,7 @@ def commands(surface: Surface, program: Path | None) -> Poses | None:
         np.zeros(0, int), np.zeros(0), np.zeros(0, int), FREEDOMS, str(program), hashlib.sha256(raw).hexdigest(), False,
         None, (),
     )  # fmt: skip
-    other, pairing = cutting_program(surface.request, surface.program, part)
+    other, pairing = cutting_program(surface.request, surface.program.ready, part)
     assert other is not None
     assert pairing is not None
     poses, lost = commands_at(surface.program.ready, other, pairing, surface.row, surface.share)
