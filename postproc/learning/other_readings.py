@@ -15,7 +15,7 @@ from postproc.base.arrays import Bools
 from postproc.base.findings import Finding
 from postproc.learning.attribution import Attribution, evidence_of
 from postproc.learning.causes import CausePrediction
-from postproc.learning.plausible import LIKELIER, wrong_program, wrong_sign
+from postproc.learning.plausible import EXCHANGED, LIKELIER, wrong_program, wrong_sign
 
 STRAINED = 1.5
 """Standard deviations before the measurement from which on a cause may have an easier explanation."""
@@ -33,16 +33,18 @@ def check_readings(
     )
     if not strained and len(parts) == 1 and not parts[0][1]:
         return []
+    # parts that differ a little contradict each other a little, whatever their signs
+    enough = LIKELIER if len(parts) == 1 else EXCHANGED
     present = evidence_of(known, result.deviation, result.layout)
     for own, original, file in parts:
         other = np.where(own, -result.deviation, result.deviation)
         turned = evidence_of(known, other, result.layout) - present
-        if turned > LIKELIER:
+        if turned > enough:
             return [wrong_sign(turned, file)]
         if not original:
             continue
         uncorrected = np.where(own, known.errors(known.before[0]), 0.0)
         compensated = evidence_of(known, result.deviation + uncorrected, result.layout) - present
-        if compensated > LIKELIER:
+        if compensated > enough:
             return [wrong_program(compensated, file)]
     return []

@@ -92,18 +92,22 @@ class FirstLook:
         return choose_surface(whole.part(inside), 1).evidence + OUTLIERS_EACH * len(out)
 
 
-def check_deviations(look: FirstLook, feature: Sequence[str], original: bool, file: str) -> list[Finding]:
+def check_deviations(
+    look: FirstLook, feature: Sequence[str], original: bool, file: str, several: bool = False
+) -> list[Finding]:
     """Whether the deviations are too small for the probe, or far likelier with the other sign, exchanged between two of
-    the features (K,), or of a compensated program where the ``original`` is stated."""
+    the features (K,), or of a compensated program where the ``original`` is stated; ``several``: other parts tell of
+    the causes too, which are not known here."""
+    enough = EXCHANGED if several else LIKELIER
     quiet = _check_size(look, file)
     if quiet:
         return quiet
     present = look.evidence(look.deviation, look.errors)
     turned = look.evidence(-look.deviation, look.errors) - present
     compensated = look.evidence(look.deviation, 0 * look.errors) - present if original else -np.inf
-    if compensated > max(0.0, turned):
+    if compensated > max(enough if several else 0.0, turned):
         return [wrong_program(compensated, file)]
-    if turned > LIKELIER:
+    if turned > enough:
         return [wrong_sign(turned, file)]
     return _check_offset(look, present, file) or _check_features(look, feature, present, file)
 
@@ -204,10 +208,11 @@ def check_shift(part: MeasuredPart, distance: Floats) -> list[Finding]:
     if len(known) < max(FEW, 0.5 * len(distance)):
         return []
     normal, off = part.normal[known], distance[known]
-    shift, rest = np.zeros(3), off
+    shift: Floats = np.zeros(3)
+    rest: Floats = off
     weight = np.ones(len(off))
     for _ in range(ROBUST):
-        shift = np.linalg.lstsq(weight[:, None] * normal, weight * off, rcond=None)[0]
+        shift = np.asarray(np.linalg.lstsq(weight[:, None] * normal, weight * off, rcond=None)[0], float)
         rest = np.abs(off - normal @ shift)
         weight = 1.0 / np.maximum(rest, 0.1 * SHIFTED)
     if np.linalg.norm(shift) < SHIFTED or np.mean(rest < 0.5 * SHIFTED) < ALIKE:

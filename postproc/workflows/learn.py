@@ -94,7 +94,9 @@ def learn(request: LearnRequest, stage: Stage = silent) -> Learned:
     files = [(matched.file == number, not part.cut_with, str(part.file)) for number, part in enumerate(parts)]
     for own, original, name in files:
         rows = np.flatnonzero(own)
-        wrong = check_deviations(look.part(rows), [matched.feature[i] for i in rows], original, name)
+        wrong = check_deviations(
+            look.part(rows), [matched.feature[i] for i in rows], original, name, len(files) > 1
+        )
         if wrong:
             raise Refusal(*wrong)
     stage("attributing")
