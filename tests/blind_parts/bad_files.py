@@ -98,13 +98,13 @@ def _origin(cells: Cells, rng: np.random.Generator) -> None:
 
 
 GOOD = ("none", "none (by the original)")
-UNSEEN = ("sign, compensated",)
+UNSEEN = ("sign (compensated)",)
 """Seen only where the errors are large: not counted."""
 
 MISTAKES: dict[str, Callable[[Lines, np.random.Generator], Lines]] = {
     **dict.fromkeys(GOOD, lambda lines, rng: lines),
     "sign": _numbers(_sign),
-    "sign, compensated": _numbers(_sign),
+    "sign (compensated)": _numbers(_sign),
     "origin": _numbers(_origin),
     "columns X and Y": _columns(0, 1),
     "columns NX and NY": _columns(3, 4),
