@@ -119,7 +119,7 @@ class Attribution:
 
 
 @dataclass(frozen=True, eq=False)
-class _Fit:
+class _Hypothesis:
     """The most probable causes ``x`` (P,) of a prediction, the points ``kept`` (K,), and how they are explained."""
 
     prediction: CausePrediction
@@ -140,7 +140,7 @@ def attribute(
     x, kept = prediction.before[0].copy(), np.ones(len(deviation), bool)
     x, kept = _settle(prediction, deviation, layout, x, kept, outliers=True)
     explained = _explained(prediction, deviation, layout, x, kept)
-    bare = _Fit(prediction, x, kept, explained)
+    bare = _Hypothesis(prediction, x, kept, explained)
     named: list[Likelier] = []
     joined: list[MissingEffect] = []
     rivals: list[Likelier] = []
@@ -209,7 +209,7 @@ def _with_effect(
     layout: Layout,
     x: Floats,
     kept: Bools,
-) -> _Fit | None:
+) -> _Hypothesis | None:
     """The causes with those of an effect beside them; None where they cannot be found, or are as good as null.  A gap
     acts otherwise near its null than at its size: the likelier of two starts counts."""
     trial, found = prediction.with_causes(effect.causes, effect.model), []
@@ -217,7 +217,7 @@ def _with_effect(
         sizes = [start * cause.deviation for cause in effect.causes]
         try:
             moved, now = _settle(trial, deviation, layout, np.append(x, sizes), kept, outliers=True)
-            fit = _Fit(trial, moved, now, _explained(trial, deviation, layout, moved, now))
+            fit = _Hypothesis(trial, moved, now, _explained(trial, deviation, layout, moved, now))
         except np.linalg.LinAlgError:
             continue
         if np.isfinite(moved).all():
@@ -227,8 +227,8 @@ def _with_effect(
 
 
 def _instead_of_first(
-    bare: _Fit, second: MissingEffect, deviation: Floats, layout: Layout, around: Circumstances
-) -> _Fit | None:
+    bare: _Hypothesis, second: MissingEffect, deviation: Floats, layout: Layout, around: Circumstances
+) -> _Hypothesis | None:
     """The effect that was named second, without the one that was named first: near the null one of two that are alike
     may look likelier that is not so at its true size."""
     noise = float(np.median(layout.sigma[bare.kept]))
