@@ -158,7 +158,24 @@ def exchanged(rows):
     return moved
 
 
+def the_original(lines):
+    """As if the uncompensated program had cut the part: with its name and its digest."""
+    digest = hashlib.sha256((SAMPLE / "part.src").read_bytes()).hexdigest()
+    return comment("sha256", digest)(comment("cut_with", "original")(lines))
+
+
+def shifted(rows):
+    """One wall in five faces along X and is touched no more, all others are as before."""
+    return [[str(float(row[0]) + 1.0), *row[1:]] for row in rows]
+
+
 BAD = {
+    "the other sign of a part that a compensated program cut": (
+        comment("positive", "material_missing"),
+        "LRN004",
+    ),
+    "the original, with its digest": (the_original, "LRN002"),
+    "an origin that is 1 mm off": (lambda lines: with_rows(lines, shifted), "LRN003"),
     "features exchanged": (lambda lines: with_rows(lines, exchanged), "LRN004"),
     "a probe that scatters more than the part": (comment("sigma_mm", "0.6"), "LRN004"),
     "another program": (comment("sha256", "0" * 16), "LRN002"),
@@ -263,6 +280,15 @@ def test_an_output_never_replaces_an_input(shop):
     done = call(shop, "part.src", "part1.csv", "--csv", "part1.csv")
     assert done.exit_code == 1
     assert "FIL007" in done.output
+
+
+def test_a_next_program_in_place_of_the_original_leaves_nothing_behind(shop):
+    before = files(shop)
+    done = call(shop, "part.src", "part1.csv", "-o", ".")
+    assert done.exit_code == 1
+    assert "FIL007" in done.output
+    assert files(shop) == before
+    assert not (shop / "cut").exists()
 
 
 def test_the_next_part_of_a_plant_is_better(tmp_path):

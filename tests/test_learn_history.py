@@ -167,8 +167,9 @@ def test_an_earlier_part_that_is_gone_or_changed_is_no_surprise(shop):
 def test_part_of_what_was_learnt(shop):
     """Half the gain leaves half of the error: the program of before and the one of all are equally far away."""
     places = {}
+    whole = shutil.copy(SAMPLE / "part1.csv", shop / "whole.csv")
     for gain in (0.0, 0.5, 1.0):
-        learned = postproc.learn(shop / "part.src", shop / "part1.csv", gain=gain, dry_run=True)
+        learned = postproc.learn(shop / "part.src", whole, gain=gain, new_history=True, dry_run=True)
         places[gain] = learned.promise
     found = places[1.0].before
     assert places[0.0].after == pytest.approx(found, rel=0.25)
@@ -189,9 +190,9 @@ def test_a_kill_at_any_moment_loses_nothing(shop):
     """Whatever was asked of the system when the run was killed: the record is that of before or after, the program that
     was there before is still somewhere, and the same command gives the same files."""
     program, record = shop / "part.src", shop / RECORD
-    lines = (SAMPLE / "part1.csv").read_text().splitlines()
-    other = shop / "part2.csv"
-    other.write_text("\n".join([*lines[:-9], ""]))
+    lines = (shop / "part1.csv").read_text().splitlines()
+    other = shop / "part2.csv"  # of the same plant: parts that contradict each other are refused
+    other.write_text("\n".join([*lines[:-2], ""]))
     words = ["learn", program, other, "-q"]
     before = record.read_bytes()
     old = (shop / "learned" / "part.src").read_bytes()

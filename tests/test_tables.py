@@ -36,6 +36,18 @@ def refused(path: Path, *columns: str) -> Finding:
     return caught.value.findings[0]
 
 
+@pytest.mark.parametrize("first", ["sep=;", "SEP=;", '"sep=;"', "sep=;;;"])
+def test_the_separator_that_excel_states_is_no_header(tmp_path, first):
+    table = read_table(write(tmp_path, f"{first}\n# a note\nline;fx\n1;2,5\n"), "FRC003")
+    assert (table.header_line, table.separator, table.comments) == (3, ";", ((2, "a note"),))
+    np.testing.assert_array_equal(table.numbers("fx"), [2.5])
+
+
+def test_a_separator_that_is_a_column_stays_one(tmp_path):
+    table = read_table(write(tmp_path, "sep=x;fx\n1;2,5\n"), "FRC003")
+    assert list(table.columns) == ["sep=x", "fx"]
+
+
 @pytest.mark.parametrize(
     "text",
     [

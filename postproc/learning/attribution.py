@@ -17,7 +17,7 @@ from postproc.base.arrays import Bools, Floats, Ints
 from postproc.learning.candidates import Circumstances, MissingEffect, candidates
 from postproc.learning.causes import Cause, CausePrediction
 from postproc.learning.covariance import Explanation, Layout, SmoothField, choose_surface, without_field
-from postproc.learning.excluded_points import MOST_OUTLIERS, find_outliers
+from postproc.learning.excluded_points import MOST_OUTLIERS, OUTLIERS_EACH, find_outliers
 from postproc.learning.naming import NAMED, probable_set, weigh_effects
 
 ROUNDS = 4
@@ -118,6 +118,21 @@ class Attribution:
         return np.asarray(self.layout.free @ weight)
 
 
+@dataclass(frozen=True, eq=False)
+class _Hypothesis:
+    """The most probable causes ``x`` (P,) of a prediction, the points ``kept`` (K,), and how they are explained."""
+
+    prediction: CausePrediction
+    x: Floats
+    kept: Bools
+    explained: Explanation
+
+    @property
+    def evidence(self) -> float:
+        """Logarithm of the probability of the deviations, outliers at their cost."""
+        return self.explained.evidence + OUTLIERS_EACH * int((~self.kept).sum())
+
+
 def attribute(
     prediction: CausePrediction, deviation: Floats, layout: Layout, around: Circumstances, search: bool = True
 ) -> Attribution:
@@ -125,6 +140,7 @@ def attribute(
     x, kept = prediction.before[0].copy(), np.ones(len(deviation), bool)
     x, kept = _settle(prediction, deviation, layout, x, kept, outliers=True)
     explained = _explained(prediction, deviation, layout, x, kept)
+    bare = _Hypothesis(prediction, x, kept, explained)
     named: list[Likelier] = []
     joined: list[MissingEffect] = []
     rivals: list[Likelier] = []
@@ -146,24 +162,23 @@ def attribute(
         if len(alike) > 1 and best.effect.name in ("engagement", "drift"):
             alternatives = tuple(one.effect.name for one in alike)  # the next program could not apply it
             break
-        wider = [replace(cause, deviation=best.factor * cause.deviation) for cause in best.effect.causes]
-        trial = prediction.with_causes(wider, best.effect.model)
-        start = np.append(x, np.zeros(len(wider)))
-        try:
-            moved, kept_now = _settle(trial, deviation, layout, start, best.kept, outliers=True)
-        except np.linalg.LinAlgError:
+        wide = best.effect.widened(best.factor)
+        trial = _with_effect(prediction, wide, deviation, layout, x, best.kept)
+        if trial is None:
             break
-        if not np.isfinite(moved).all():
-            break
-        fitted = _explained(trial, deviation, layout, moved, kept_now)
-        if not _differs_from_null(fitted, len(wider)):
-            break
+        if len(joined) == 1 and len(named) == 1 and len(alike) == 1:
+            alone = _instead_of_first(bare, wide, deviation, layout, around)
+            if alone is not None and alone.evidence > trial.evidence - NAMED:
+                # the first one only stood for this one
+                named, joined = [rivals[0]], [best.effect]
+                prediction, x, kept, explained = alone.prediction, alone.x, alone.kept, alone.explained
+                break
         if len(alike) > 1:
             alternatives, stand_in = tuple(one.effect.name for one in alike), best.effect.name
         else:
             named.append(rivals[0])
         joined.append(best.effect)
-        prediction, x, kept, explained = trial, moved, kept_now, fitted
+        prediction, x, kept, explained = trial.prediction, trial.x, trial.kept, trial.explained
     verdict = _verdict(bool(alternatives), bool(named), explained)
     mean, covariance = explained.causes()
     root = prediction.before[1]
@@ -185,6 +200,60 @@ def attribute(
         verdict,
         standardised,
     )
+
+
+def _with_effect(
+    prediction: CausePrediction,
+    effect: MissingEffect,
+    deviation: Floats,
+    layout: Layout,
+    x: Floats,
+    kept: Bools,
+) -> _Hypothesis | None:
+    """The causes with those of an effect beside them; None where they cannot be found, or are as good as null.  A gap
+    acts otherwise near its null than at its size: the likelier of two starts counts."""
+    trial, found = prediction.with_causes(effect.causes, effect.model), []
+    for start in (0.0, 1.0):
+        sizes = [start * cause.deviation for cause in effect.causes]
+        try:
+            moved, now = _settle(trial, deviation, layout, np.append(x, sizes), kept, outliers=True)
+            fit = _Hypothesis(trial, moved, now, _explained(trial, deviation, layout, moved, now))
+        except np.linalg.LinAlgError:
+            continue
+        if np.isfinite(moved).all():
+            found.append(fit)
+    best = max(found, key=lambda fit: fit.evidence, default=None)
+    return best if best is not None and _differs_from_null(best.explained, len(effect.causes)) else None
+
+
+def _instead_of_first(
+    bare: _Hypothesis, second: MissingEffect, deviation: Floats, layout: Layout, around: Circumstances
+) -> _Hypothesis | None:
+    """The effect that was named second, without the one that was named first: near the null one of two that are alike
+    may look likelier that is not so at its true size."""
+    noise = float(np.median(layout.sigma[bare.kept]))
+    offered = candidates(bare.prediction, bare.x, around, noise)
+    own = next((one for one in offered if one.name == second.name), None)
+    if own is None:
+        return None
+    factor = second.causes[0].deviation / own.causes[0].deviation
+    fits = [
+        _with_effect(bare.prediction, own.widened(size), deviation, layout, bare.x, bare.kept)
+        for size in sorted({1.0, factor})
+    ]
+    return max((fit for fit in fits if fit is not None), key=lambda fit: fit.evidence, default=None)
+
+
+def evidence_of(prediction: CausePrediction, deviation: Floats, layout: Layout) -> float:
+    """Logarithm of the probability of deviations (K,) [m] by the known causes, about their most probable values
+    (Laplace's approximation), outliers at their cost; -inf where nothing can make them."""
+    start, every = prediction.before[0].copy(), np.ones(len(deviation), bool)
+    try:
+        x, kept = _settle(prediction, deviation, layout, start, every, outliers=True)
+        explained = _explained(prediction, deviation, layout, x, kept)
+    except np.linalg.LinAlgError:
+        return -np.inf
+    return explained.evidence + OUTLIERS_EACH * int((~kept).sum())
 
 
 def _differs_from_null(explained: Explanation, count: int) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,6 +41,11 @@ class MissingEffect:
     model: StiffnessModel
     columns: Floats
     transfers: bool
+
+    def widened(self, factor: float) -> MissingEffect:
+        """With ``factor`` times the standard deviations of its causes, and the same columns."""
+        wide = tuple(replace(cause, deviation=factor * cause.deviation) for cause in self.causes)
+        return replace(self, causes=wide)
 
 
 @dataclass(frozen=True, eq=False)

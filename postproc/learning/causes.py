@@ -20,12 +20,13 @@ from postproc.model import StiffnessModel
 from postproc.process.force_factors import axes_across
 from postproc.robot.description import COVERAGE
 
-UNSTATED = 0.125
+UNSTATED = 0.25 / 3**0.5
 """Standard deviation of an elastic parameter as a share of it, where the robot file states no interval of 95 %: arms of
-one type differ by a quarter."""
+one type differ by up to a quarter, every share as likely as any other."""
 
-FORCE_COMMON, FORCE_OWN = 0.15, 0.13
-"""The same of the forces: what all operations share (material, wear), and each one's own (engagement)."""
+FORCE_COMMON, FORCE_OWN = 0.17, 0.15
+"""The same of the forces: what all operations share (material, wear), and each one's own (engagement); together a force
+is off by up to 39 %, every share as likely as any other."""
 
 FORCE_TURN = 0.1
 """[rad] of the direction of the force of an operation, about each of two axes across it."""

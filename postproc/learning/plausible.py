@@ -8,7 +8,7 @@ from itertools import combinations, islice
 
 import numpy as np
 
-from postproc.base.arrays import Bools, Floats
+from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.findings import Finding
 from postproc.base.units import MM
 from postproc.learning.attribution import Attribution
@@ -38,8 +38,17 @@ LOUD = 3.0
 UNEXPLAINED = 0.6
 """Share of the deviations of left-out points that may remain."""
 
+ROBUST = 6
+"""Rounds in which points that lie elsewhere lose their weight."""
+
 COPIED, SAME = 0.6, 5e-6
 """Share of points that lie off the nominal surface by their own deviation, to [m]."""
+
+FEW_BESIDE = 3
+"""Points that no tool touches, from which on they may tell that all of them are shifted."""
+
+SHIFTED, ALIKE = 0.06 * MM, 0.9
+"""[m] A shift of all points beyond chords and roundings; share of the points that lie as far off as it says."""
 
 TOUCHED = 0.75
 """Share of points that tools of the program have to touch."""
@@ -55,6 +64,11 @@ class FirstLook:
     errors: Floats
     columns: Floats
     by_force: Floats
+
+    def part(self, rows: Ints) -> FirstLook:
+        """Of some points (J,)."""
+        own = self.layout.part(rows), self.deviation[rows], self.errors[rows], self.columns[rows]
+        return FirstLook(*own, self.by_force[rows])
 
     @staticmethod
     def of(prediction: CausePrediction, deviation: Floats, layout: Layout) -> FirstLook:
@@ -78,29 +92,45 @@ class FirstLook:
         return choose_surface(whole.part(inside), 1).evidence + OUTLIERS_EACH * len(out)
 
 
-def check_deviations(look: FirstLook, feature: Sequence[str], original: bool, file: str) -> list[Finding]:
+def check_deviations(
+    look: FirstLook, feature: Sequence[str], original: bool, file: str, several: bool = False
+) -> list[Finding]:
     """Whether the deviations are too small for the probe, or far likelier with the other sign, exchanged between two of
-    the features (K,), or of a compensated program where the ``original`` is stated."""
+    the features (K,), or of a compensated program where the ``original`` is stated; ``several``: other parts tell of
+    the causes too, which are not known here."""
+    enough = EXCHANGED if several else LIKELIER
     quiet = _check_size(look, file)
     if quiet:
         return quiet
     present = look.evidence(look.deviation, look.errors)
     turned = look.evidence(-look.deviation, look.errors) - present
     compensated = look.evidence(look.deviation, 0 * look.errors) - present if original else -np.inf
-    if compensated > max(0.0, turned):
-        message = (
-            "the deviations are likelier of a compensated program than of the original, which the file states"
-        )
-        help = "state the program that really ran: `# cut_with: compensated/part.src`, and its sha256"
-        return [Finding("LRN002", message, file, help=help)]
-    if turned > LIKELIER:
-        message = (
-            f"the deviations are exp({turned:.0f}) times likelier with the other sign: probably they"
-            " count what is missing as positive, or the reverse"
-        )
-        help = "check the line `# positive:` against a place that was cut too deep"
-        return [Finding("LRN004", message, file, help=help)]
+    if compensated > max(enough if several else 0.0, turned):
+        return [wrong_program(compensated, file)]
+    if turned > enough:
+        return [wrong_sign(turned, file)]
     return _check_offset(look, present, file) or _check_features(look, feature, present, file)
+
+
+def wrong_program(gain: float, file: str) -> Finding:
+    """That a compensated program cut the part; gain: logarithm of how much likelier that is."""
+    message = (
+        f"the deviations are exp({gain:.0f}) times likelier of a compensated program than of the original, which the"
+        " file states"
+    )
+    help = "state the program that really ran: `# cut_with: compensated/part.src`, and its sha256"
+    return Finding("LRN002", message, file, help=help)
+
+
+def wrong_sign(gain: float, file: str) -> Finding:
+    """That DEV counts the other way; gain: logarithm of how much likelier that is."""
+    message = (
+        f"the deviations are exp({gain:.0f}) times likelier with the other sign: probably they count what is missing"
+        " as positive, or the reverse"
+    )
+    return Finding(
+        "LRN004", message, file, help="check the line `# positive:` against a place that was cut too deep"
+    )
 
 
 def _check_size(look: FirstLook, file: str) -> list[Finding]:
@@ -169,6 +199,28 @@ def check_nominal(part: MeasuredPart, distance: Floats) -> list[Finding]:
     return [
         Finding("LRN004", message, str(part.file), help="export the nominal points of the measuring plan")
     ]
+
+
+def check_shift(part: MeasuredPart, distance: Floats) -> list[Finding]:
+    """Whether all points lie beside the surface by one shift d, by n . d each; distance (K,) [m] of the points to the
+    tool, NaN where none touches."""
+    known = np.flatnonzero(np.isfinite(distance))
+    if len(known) < max(FEW, 0.5 * len(distance)):
+        return []
+    normal, off = part.normal[known], distance[known]
+    shift: Floats = np.zeros(3)
+    rest: Floats = off
+    weight = np.ones(len(off))
+    for _ in range(ROBUST):
+        shift = np.asarray(np.linalg.lstsq(weight[:, None] * normal, weight * off, rcond=None)[0], float)
+        rest = np.abs(off - normal @ shift)
+        weight = 1.0 / np.maximum(rest, 0.1 * SHIFTED)
+    if np.linalg.norm(shift) < SHIFTED or np.mean(rest < 0.5 * SHIFTED) < ALIKE:
+        return []
+    words = ", ".join(f"{axis} {one / MM:+.2f}" for axis, one in zip("XYZ", shift.tolist(), strict=True))
+    message = f"the points lie beside the surface of this program, all of them by the same shift: {words} mm"
+    help = "measure in the axes of the program's $BASE, or move the points: their origin is another one"
+    return [Finding("LRN003", message, str(part.file), help=help)]
 
 
 def check_explained(result: Attribution, file: str) -> list[Finding]:

@@ -1,9 +1,12 @@
-"""What the next program promises: the error that remains at the measured points, with an interval.
+"""What the next program promises: the error that remains where a point was not measured, with an interval.
 
-    V = P (K_f - K_f K^-1 K_f) P + scatter,   K_f: causes and field,   P: takes the freedoms of the alignment out
+    V = P (K_f - K_f K^-1 K_f) P,   K_f: causes and field,   P: takes the freedoms of the alignment out
+    v_i = V_ii + (P K_f K^-1)_ii^2 / (K^-1)_ii + scatter^2
 
-The covariance believes its own assumptions; parts that were cut by other physics have errors larger by about
-``HOPE`` (``python -m tests.blind_parts``), and the upper end of the interval is ``UPPER`` of it.
+v_i: of a measured place without its own measurement, which is taken out of K again (one row: C. E. Rasmussen, C. K. I.
+Williams: Gaussian Processes for Machine Learning, MIT Press 2006, eq. 5.12); few points know themselves well and their
+surroundings badly.  The covariance believes its own assumptions; parts that were cut by other physics have errors
+larger by about ``HOPE`` (``python -m tests.blind_parts``), and the upper end of the interval is ``UPPER`` of it.
 """
 
 from __future__ import annotations
@@ -12,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.base.arrays import Bools, Floats
+from postproc.base.arrays import Bools, Floats, Ints
 from postproc.learning.attribution import Attribution
-from postproc.learning.covariance import SCATTER
+from postproc.learning.covariance import SCATTER, Explanation
 
 HOPE, UPPER, LOWER = 1.1, 3.0, 0.38
 """Ratios: what remains to what the covariance says, and the ends of its 95 % interval."""
@@ -22,8 +25,8 @@ HOPE, UPPER, LOWER = 1.1, 3.0, 0.38
 
 @dataclass(frozen=True)
 class Promise:
-    """RMS [m] at the measured points without the scatter of the probe: ``before`` as measured; ``after``, with the ends
-    ``lower`` and ``upper`` of its 95 % interval."""
+    """RMS [m] at places like the measured ones, without the scatter of the probe: ``before`` as measured; ``after``,
+    with the ends ``lower`` and ``upper`` of its 95 % interval."""
 
     before: float
     after: float
@@ -39,19 +42,29 @@ class Promise:
 def promise(result: Attribution, last: Bools, gain: float = 1.0) -> Promise:
     """What remains on a part like those at the points ``last`` (K,), the part that was cut last, if ``gain`` of all
     that was learnt is applied."""
-    explained, layout = result.explained, result.explained.layout
     own = np.flatnonzero(last[result.kept])
-    rows = result.kept_rows[own]
-    prior = explained.columns @ explained.columns.T + layout.field(explained.surface)
-    known = (prior - prior @ explained.inverse @ prior)[np.ix_(own, own)]
-    taken = _taken(layout.free[own])
-    remains = known - taken @ (taken.T @ known)
-    remains = remains - (remains @ taken) @ taken.T
-    scatter = SCATTER * explained.by_force[own]
-    variance = np.maximum(np.diag(remains), 0.0) + scatter**2
+    rows, taken = result.kept_rows[own], _taken(result.layout.free[result.kept_rows[own]])
+    variance = (
+        held_out_variance(result.explained, own, taken) + (SCATTER * result.explained.by_force[own]) ** 2
+    )
     withheld = (1 - gain) * (result.by_learning + result.by_field)[rows]
     after = float(np.sqrt(HOPE**2 * np.mean(variance) + np.mean(_aligned(withheld, taken) ** 2)))
     return Promise(measured_rms(result, last), after, LOWER * after, UPPER * after)
+
+
+def held_out_variance(explained: Explanation, own: Ints, taken: Floats) -> Floats:
+    """(J,) [m2] of causes and field at the points ``own`` (J,), each without its own measurement, after the alignment
+    of all J by the orthonormal columns ``taken`` (J, A)."""
+    prior = explained.columns @ explained.columns.T + explained.layout.field(explained.surface)
+    follows = prior @ explained.inverse
+
+    def aligned(whole: Floats) -> Floats:
+        return whole - taken @ (taken.T @ whole)
+
+    remains = aligned((prior - follows @ prior)[np.ix_(own, own)])
+    remains = remains - (remains @ taken) @ taken.T
+    itself = np.diag(aligned(follows[np.ix_(own, own)])) ** 2 / np.diag(explained.inverse)[own]
+    return np.asarray(np.maximum(np.diag(remains), 0.0) + itself)
 
 
 def measured_rms(result: Attribution, of: Bools) -> float:

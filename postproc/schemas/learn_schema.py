@@ -79,7 +79,9 @@ def learn_schema() -> Schema:
                 "what no cause explains",
             ),
             "residual_rms_mm": quantity("mm", "root mean square of what nothing explains"),
-            "promise": record(promise, "errors of the next part at the measured points, root mean square"),
+            "promise": record(
+                promise, "errors of the next part at places like the measured ones, root mean square"
+            ),
             "history": array(record(part, "one part"), "the parts in their order"),
             "gain": quantity("1", "share of what was learnt that the next program applies"),
             "next_program": record(following, "the next program; null where none is written", nullable=True),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from postproc.learning.causes import CausePrediction, PriorKnowledge
 from postproc.learning.history import RecordedStep
 from postproc.learning.measured_part import MeasuredPart, read_measured_part
 from postproc.learning.next_program import force_factors, learned_error
+from postproc.learning.other_readings import check_readings
 from postproc.learning.plausible import FirstLook, check_deviations, check_explained
 from postproc.learning.promise import Promise, measured_rms, promise
 from postproc.learning.push_test import with_push_test
@@ -29,9 +31,17 @@ from postproc.process import Wrenches
 from postproc.report.learned import Learned, LearnedPart, learned_csv
 from postproc.report.report import exit_code, in_order_of_place, json_bytes
 from postproc.robot.description import robot_of
+from postproc.workflows.learn_commands import cutting_file
 from postproc.workflows.learn_corners import corner_error
-from postproc.workflows.learn_history import Remembered, keep_program, record_path, record_step, remember
-from postproc.workflows.learn_points import CutProgram, Matched, cutting_file, match, read_job
+from postproc.workflows.learn_history import (
+    Remembered,
+    keep_program,
+    kept_before,
+    record_path,
+    record_step,
+    remember,
+)
+from postproc.workflows.learn_points import CutProgram, Matched, match, read_job
 from postproc.workflows.learn_robot import force_factor_lines, learned_robot_file
 from postproc.workflows.preparation import LearnedInputs, Request, Stage, silent
 from postproc.workflows.program import compensate
@@ -81,17 +91,21 @@ def learn(request: LearnRequest, stage: Stage = silent) -> Learned:
         prediction = with_push_test(prediction, read_measurements(request.push, joints))
     file = str(parts[0].file)
     look = FirstLook.of(prediction, matched.deviation, matched.layout)
-    original = not any(part.cut_with for part in parts)
-    wrong = check_deviations(look, matched.feature, original, file)
-    if wrong:
-        raise Refusal(*wrong)
+    files = [(matched.file == number, not part.cut_with, str(part.file)) for number, part in enumerate(parts)]
+    for own, original, name in files:
+        rows = np.flatnonzero(own)
+        wrong = check_deviations(
+            look.part(rows), [matched.feature[i] for i in rows], original, name, len(files) > 1
+        )
+        if wrong:
+            raise Refusal(*wrong)
     stage("attributing")
     try:
         result = attribute(prediction, matched.deviation, matched.layout, matched.around)
     except np.linalg.LinAlgError as error:
         message = f"the deviations determine no causes: {error}"
         raise Refusal(Finding("LRN004", message, file, help="check DEV and the base of the points")) from None
-    wrong = check_explained(result, file)
+    wrong = check_explained(result, file) or check_readings(prediction, result, files)
     if wrong:
         raise Refusal(*wrong)
     promised = promise(result, matched.file == len(parts) - 1, request.gain)
@@ -258,18 +272,19 @@ def _published(
     _spare(request, job, parts, [*files, own, *extra, remembered.path])
     applied = result.damped(request.gain)
     inputs = _learned_inputs(job, matched, applied)
-    acting = learned_robot_file(applied, robot, parts, gap, robot_path, at_this_place=True) or content
+    acting = content
+    if request.gain != 1.0 or result.stand_in:
+        acting = learned_robot_file(applied, robot, parts, gap, robot_path, at_this_place=True) or content
     if acting is not None:
         inputs = replace(inputs, robot=robot_of(acting, robot_path))
     following = folder / main.program.name
-    if not request.dry_run:
-        keep_program(following)
     if learned.promise.better:
         stage("compensating the next program")
-        report = compensate(
-            replace(main, output=following, learned=inputs, dry_run=request.dry_run, json=None),
-            stage,
-        )
+        with nullcontext() if request.dry_run else kept_before(following):
+            report = compensate(
+                replace(main, output=following, learned=inputs, dry_run=request.dry_run, json=None),
+                stage,
+            )
         findings = in_order_of_place([*learned.findings, *report.findings])
         learned = replace(
             learned, next_program=report, findings=findings, exit=exit_code(findings, request.strict)

@@ -8,7 +8,8 @@ record of before or of after, and repeating it gives the same.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -26,7 +27,8 @@ from postproc.learning.history import (
 from postproc.learning.measured_part import MeasuredPart, read_measured_part
 from postproc.output.atomic_write import write_atomically
 from postproc.robot.description import Robot
-from postproc.workflows.learn_points import SHORT, CutProgram
+from postproc.workflows.learn_commands import SHORT
+from postproc.workflows.learn_points import CutProgram
 from postproc.workflows.preparation import Request
 
 KEPT = "cut"
@@ -160,6 +162,23 @@ def _refuse_counted_twice(robot: Robot, parts: Sequence[MeasuredPart]) -> None:
 
 def _refused(path: Path, message: str, help: str) -> Refusal:
     return Refusal(Finding("LRN015", message, str(path), help=help))
+
+
+@contextmanager
+def kept_before(program: Path) -> Iterator[None]:
+    """Keeps a program while another one is written to its place; after an error there is no new copy of it."""
+    there = program.is_file() and kept_place(program, hashlib.sha256(read_file(program)).hexdigest()).exists()
+    kept = keep_program(program)
+    try:
+        yield
+    except BaseException:
+        if kept is not None and not there:
+            for path in (kept, kept.with_suffix(".dat")):
+                path.unlink(missing_ok=True)
+            for folder in (kept.parent, kept.parent.parent):
+                with suppress(OSError):  # it has other programs
+                    folder.rmdir()
+        raise
 
 
 def keep_program(program: Path) -> Path | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -13,7 +12,6 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import Poses, turned
-from postproc.base.read_files import read_text_file
 from postproc.base.units import MM
 from postproc.cell import frames_of
 from postproc.effects import Conditions
@@ -30,22 +28,19 @@ from postproc.learning.causes import (
 from postproc.learning.covariance import FREE_SHIFT, FREE_TURN, Layout
 from postproc.learning.measured_part import FREEDOMS, MeasuredPart
 from postproc.learning.next_program import FeedTurns
-from postproc.learning.plausible import check_contacts, check_nominal
+from postproc.learning.plausible import FEW_BESIDE, TOUCHED, check_contacts, check_nominal, check_shift
 from postproc.learning.touched_points import TouchedPoints, touched_points
 from postproc.part.contact import Contacts, CuttingMotions, find_contacts
 from postproc.process.operation_names import OperationNames
 from postproc.process.stock.cutters import Cutter
 from postproc.process.stock.stock_section import has_stock, read_stock_process
-from postproc.verification.pairing import Different, Pairing, pair_motions
+from postproc.verification.pairing import Pairing
 from postproc.workflows.cell_force_factors import operations_of
-from postproc.workflows.learn_commands import commands_at
+from postproc.workflows.learn_commands import commands_at, cutting_program
 from postproc.workflows.preparation import Prepared, Request, prepare
 
-SHORT = 12
-"""Digits of a SHA-256 that name a kept program."""
-
-WIDE = 0.5 * MM
-"""Distance at which a point is still compared with the surface, to see whether it is a measured place."""
+WIDE = 2 * MM
+"""Distance at which a point is still compared with the surface, to see whether it is a measured place, or shifted."""
 
 DEEPER = 0.02 * MM
 """A visit before the last that is predicted to cut deeper by more than this may have left the point."""
@@ -192,7 +187,7 @@ def match(
     number = 0
     group: list[Ints] = []
     for part in parts:
-        other, pairing = cutting_program(request, job, part, kept)
+        other, pairing = cutting_program(request, job.ready, part, kept)
         points, keep, reported = _touched(job, part, other, pairing)
         findings += reported
         several.append(points)
@@ -258,48 +253,6 @@ def _free(rigid: Floats, part: Ints, fixed: Bools) -> Floats:
     return np.stack(columns, axis=1) if columns else np.zeros((len(part), 0))
 
 
-def cutting_file(main: Path, part: MeasuredPart, kept: Sequence[Path] = ()) -> tuple[Path, str]:
-    """The file of the program that cut ``part``, and its SHA-256; ``kept``: folders with copies of programs by the
-    start of their SHA-256.  Raises Refusal LRN002."""
-    places = [main]
-    if part.cut_with:
-        places = [folder / part.cut_with for folder in (part.file.parent, main.parent)]
-    places += [folder / part.program_digest[:SHORT] / main.name for folder in kept]
-    found = [path for path in places if path.is_file()]
-    for path in found:
-        digest = hashlib.sha256(read_text_file(path)).hexdigest()
-        if digest.startswith(part.program_digest):
-            return path, digest
-    if not found:
-        message = f"# cut_with: {part.cut_with} is neither beside this file nor beside {main.name}"
-        raise Refusal(Finding("LRN002", message, str(part.file), help="name the program that cut the part"))
-    digest = hashlib.sha256(read_text_file(found[0])).hexdigest()
-    message = (
-        f"{found[0].name} is not the program that cut this part: its SHA-256 starts with {digest[:SHORT]}"
-    )
-    help = f"the file states {part.program_digest[:SHORT]}; name the program as it ran, not a later one"
-    raise Refusal(Finding("LRN002", message, str(part.file), help=help))
-
-
-def cutting_program(
-    request: Request, job: CutProgram, part: MeasuredPart, kept: Sequence[Path] = ()
-) -> tuple[Prepared | None, Pairing | None]:
-    """The program that cut ``part``, None for the original; ``kept``: of ``cutting_file``.  Raises Refusal LRN002."""
-    main = request.program
-    path, _ = cutting_file(main, part, kept)
-    if path.resolve() == main.resolve():
-        return None, None
-    cell = job.ready.cell.path
-    other = prepare(replace(request, program=path, force=None, cell=cell if cell.is_file() else request.cell))
-    try:
-        return other, pair_motions(job.ready.task, other.task)
-    except Different as error:
-        message = f"{path.name} does not come from {main.name}: {error}"
-        raise Refusal(
-            Finding("LRN002", message, str(part.file), help="name the original of this program")
-        ) from None
-
-
 def _touched(
     job: CutProgram, part: MeasuredPart, other: Prepared | None, pairing: Pairing | None
 ) -> tuple[TouchedPoints, Ints, list[Finding]]:
@@ -308,9 +261,10 @@ def _touched(
     only = _restricted(job, part)
     contacts = find_contacts(job.motions, point, normal, only)
     findings = check_contacts(part, contacts.touched)
-    if findings or contacts.touched.mean() < 0.9:
+    if findings or (~contacts.touched).sum() >= FEW_BESIDE:
         wide = find_contacts(job.motions, point, normal, only, WIDE)
-        findings = [*check_nominal(part, np.where(wide.touched, _signed(wide), np.nan)), *findings]
+        beside = np.where(wide.touched, _signed(wide), np.nan)
+        findings = [*check_nominal(part, beside), *check_shift(part, beside), *findings]
     else:
         findings = check_nominal(part, np.where(contacts.touched, _signed(contacts), np.nan))
     if findings:
@@ -318,11 +272,16 @@ def _touched(
     keep = np.flatnonzero(contacts.touched)
     unsure = _unsure(job, point, normal, contacts)
     keep = keep[~unsure[keep]]
-    command = None
+    command, gone = None, 0
     if other is not None and pairing is not None:
         command, lost = commands_at(
             job.ready, other, pairing, contacts.last.row[keep], contacts.last.share[keep]
         )
+        gone = int(lost.sum())
+        if gone > (1 - TOUCHED) * len(keep):
+            message = f"{part.cut_with} does not lead the tool to {gone} of {len(keep)} points"
+            help = "name the program that cut this part, and the original of it"
+            raise Refusal(Finding("LRN002", message, str(part.file), help=help))
         keep, command = keep[~lost], command[~lost]
     points = touched_points(
         job.ready.task,
@@ -333,9 +292,11 @@ def _touched(
     )
     good = np.flatnonzero(points.good & np.isfinite(points.errors(job.ready.model)))
     if len(good) < len(part):
-        gone = len(part) - len(good)
-        words = f"{gone} of {len(part)} points are not used: {int((~contacts.touched).sum())} are touched by no tool"
+        words = f"{len(part) - len(good)} of {len(part)} points are not used:"
+        words += f" {int((~contacts.touched).sum())} are touched by no tool"
         words += f", {int(unsure.sum())} may be cut by more than one motion"
+        if gone:
+            words += f", {gone} are not reached by the program that cut the part"
         rows = np.setdiff1d(np.arange(len(part)), keep[good])
         findings.append(Finding("LRN005", words, str(part.file), int(part.line[rows[0]])))
     if len(good) < 6:

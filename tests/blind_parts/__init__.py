@@ -4,7 +4,7 @@ The plant is other physics than the model: springs, a spatial tendon and weights
 tool and hidden hardware drawn for each part.  The process that learns is given a folder with a program, a cell and the
 CSV of the part, and writes the next program, which the plant cuts; the truth stays in the memory of this process.
 
-    python -m tests.blind_parts [--rows same50,...] [--draws N] [--seed S] [--workers N] [--out FILE]
+    python -m tests.blind_parts [--rows same50,...] [--draws N] [--seed S] [--minutes M] [--append FILE]
 
     shop      the part: program, cell, points of its surface
     truth     what the robot and the process of a draw really are

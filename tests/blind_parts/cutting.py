@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from weakref import WeakKeyDictionary
 
@@ -15,8 +16,8 @@ from postproc.effects import Conditions
 from postproc.learning.measured_part import FREEDOMS, MeasuredPart
 from postproc.learning.touched_points import touched_points
 from postproc.part.contact import find_contacts
-from postproc.workflows.learn_commands import commands_at
-from postproc.workflows.learn_points import CutProgram, cutting_program, read_job
+from postproc.workflows.learn_commands import commands_at, cutting_program
+from postproc.workflows.learn_points import CutProgram, read_job
 from postproc.workflows.preparation import Request
 
 from .truth import SCATTER, Truth
@@ -25,7 +26,7 @@ CORNER = 8.0
 """[mm] along the path from a corner, within which the cutter is in it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Surface:
     """A shop's program and K points of its surface, in mm in the base, with their motions."""
 
@@ -42,9 +43,14 @@ class Surface:
         return Request(self.folder / "part.src", force="")
 
 
+@lru_cache(maxsize=4)
+def _job(folder: Path, program: bytes, cell: bytes) -> CutProgram:
+    return read_job(Request(folder / "part.src", force=""))
+
+
 def surface_of(folder: Path, point: np.ndarray, normal: np.ndarray, feature: list[str]) -> Surface:
     """Points that one motion of the program cuts."""
-    job = read_job(Request(folder / "part.src", force=""))
+    job = _job(folder, (folder / "part.src").read_bytes(), (folder / "cell.yaml").read_bytes())
     base = job.ready.task.base[job.motions.rows[:1]]
     place = base.position + 1e-3 * point @ base.rotation[0].T
     contacts = find_contacts(job.motions, place, normal @ base.rotation[0].T)
@@ -57,17 +63,25 @@ def commands(surface: Surface, program: Path | None) -> Poses | None:
     if program is None:
         return None
     raw = program.read_bytes()
+    known = _SENT.setdefault(surface, {})
+    if raw in known:
+        return known[raw]
     part = MeasuredPart(
         surface.folder / "x.csv", "", surface.point, surface.normal, np.zeros(0), np.zeros(0), (), (), np.zeros(0, int),
         np.zeros(0, int), np.zeros(0), np.zeros(0, int), FREEDOMS, str(program), hashlib.sha256(raw).hexdigest(), False,
         None, (),
     )  # fmt: skip
-    other, pairing = cutting_program(surface.request, surface.program, part)
+    other, pairing = cutting_program(surface.request, surface.program.ready, part)
     assert other is not None
     assert pairing is not None
     poses, lost = commands_at(surface.program.ready, other, pairing, surface.row, surface.share)
     assert not lost.any()
+    known[raw] = poses
     return poses
+
+
+_SENT: WeakKeyDictionary[Surface, dict[bytes, Poses]] = WeakKeyDictionary()
+"""Where programs send the controller at the points of a surface."""
 
 
 def cut(

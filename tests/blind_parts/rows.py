@@ -6,6 +6,7 @@ import json
 import shutil
 import subprocess
 import sys
+import zlib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -97,9 +98,9 @@ def prepare_shops(folder: Path) -> tuple[Path, Path]:
 
 
 def draw(row: str, seed: int, shops: tuple[Path, Path], learner: Learner) -> dict[str, Any]:
-    """One part of one truth, what is learnt of it, and the part after it."""
+    """One part of one truth, what is learnt of it, and the part after it; every row has truths of its own."""
     options = OPTIONS[row]
-    rng = np.random.default_rng([seed, 4711])
+    rng = np.random.default_rng([seed, zlib.crc32(row.encode())])
     noise, count = options.get("noise", NOISE), options["count"]
     total = max(POINTS, count)
     point, normal, feature = surface_points(total, rng)
@@ -186,11 +187,16 @@ def _covered(told: dict[str, Any], truth: Truth) -> dict[str, list[int]]:
         f"joint_compliance.c{i}": float(np.log(c / filed))
         for i, (c, filed) in enumerate(zip(truth.compliance, filed_compliances(), strict=True), 1)
     }
+    turns: dict[str, float] = {}
+    for name, (lift, swing) in truth.turn.items():
+        # the plant swings the other way round
+        turns |= {f"lift of the force of {name}": lift, f"swing of the force of {name}": -swing}
     kinds = {
         "compliances of joints": (told["causes"], compliances),
         "balancer": (told["causes"], {"gravity_compensator.K_c": float(np.log(truth.spring))}),
         "tool": (told["causes"], {"radius of tool 1": truth.radius, "length of tool 1": truth.length}),
         "forces of operations": (told["forces"], {n: float(np.log(f)) for n, f in truth.factor.items()}),
+        "directions of forces": (told["causes"], turns),
         "named effects": (told["sizes"], truth.names()),
     }
     return {

@@ -163,16 +163,30 @@ def _met(answer: dict[str, Any], names: Sequence[str]) -> bool:
 
 
 def _coverage(answers: Sequence[dict[str, Any]]) -> list[str]:
-    """Share of true values in their intervals of 95 %."""
-    hits: dict[str, list[int]] = {}
+    """Share of true values in their intervals of 95 %, of robots without and with hidden hardware."""
+    kinds: dict[str, None] = {}
+    hits: dict[tuple[str, bool], list[int]] = {}
     for one in answers:
-        for kind, inside in one.get("covered", {}).items():
-            hits.setdefault(kind, []).extend(inside)
+        covered = dict(one.get("covered", {}))
         if "parts" in one:
             low, high = one["promise"][2:]
-            hits.setdefault("error of the next part", []).append(int(low <= one["parts"][0] <= high))
-    if not hits:
+            covered["error of the next part"] = [int(low <= one["parts"][0] <= high)]
+        for kind, inside in covered.items():
+            kinds[kind] = None
+            hits.setdefault((kind, bool(one["hidden"])), []).extend(inside)
+    if not kinds:
         return []
-    text = ["", "| 95 % interval of | values | true value inside % |", "| --- | --- | --- |"]
-    text += [f"| {kind} | {len(one)} | {share_interval(sum(one), len(one))} |" for kind, one in hits.items()]
+    text = [
+        "",
+        "| 95 % interval of | nothing hidden: values | true value inside % | hidden: values | inside % |",
+    ]
+    text += ["| --- |" + " --- |" * 4]
+    for kind in kinds:
+        cells = [
+            word
+            for hidden in (False, True)
+            for own in [hits.get((kind, hidden), [])]
+            for word in (str(len(own)), share_interval(sum(own), len(own)))
+        ]
+        text.append(f"| {kind} | " + " | ".join(cells) + " |")
     return text

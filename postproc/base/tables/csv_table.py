@@ -2,14 +2,15 @@
 
 A header row, then rows with as many cells.  Comma, semicolon or tab, whichever gives the header most cells;
 where it is not the comma, a decimal comma is understood.  Blank lines and lines that start with ``#`` are skipped,
-above the header also those that a spreadsheet has put in quotes.  An apostrophe before = + - @, by which a spreadsheet
-is informed that a cell is no formula, is not part of the cell.
+above the header also those that a spreadsheet has put in quotes, and the ``sep=;`` of Excel.  An apostrophe before
+= + - @, by which a spreadsheet is informed that a cell is no formula, is not part of the cell.
 """
 
 from __future__ import annotations
 
 import hashlib
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,8 @@ from postproc.base.read_files import read_text_file
 from postproc.base.tables.csv_cells import CsvColumn, find_cells
 from postproc.base.tables.csv_lines import LINE_ENDS, NOTHING, CsvLines, comment, separator_of
 from postproc.base.tables.csv_spelling import is_missing, is_number
+
+_SEPARATOR = re.compile(r'"?sep=["\']?[;,|\t]["\']?[;,\t]*$', re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +170,7 @@ def _above(lines: CsvLines) -> tuple[list[tuple[int, str]], str | None, int, int
         note = comment(line, above=True)
         if note is not None:
             comments.append((number, note))
-        elif line.strip(NOTHING):
+        elif line.strip(NOTHING) and not _SEPARATOR.match(line):
             return comments, line, number, next_start
         start = next_start
     return comments, None, number, start
