@@ -74,7 +74,8 @@ class CoupledEngagement:
     def along(self, motion: Ints, share: Floats) -> Floats:
         """(K, 6) [N, N m] the wrench at the shares (K,) of motions (K,); zero where nothing was solved."""
         at = 2.0 * motion + share
-        after = np.clip(np.searchsorted(self.key, at), 1, len(self.key) - 1)
+        # from the right: the start of a motion belongs to it, not to the end of the one before
+        after = np.clip(np.searchsorted(self.key, at, side="right"), 1, len(self.key) - 1)
         low, high = self.key[after - 1], self.key[after]
         within = np.clip((at - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)[:, None]
         known = (np.floor(low / 2) == motion) & (at <= high + 1e-9)
