@@ -158,17 +158,23 @@ def laws_of(sweeps: MotionSweeps, toolpath: Toolpath, edges: dict[int, Edges]) -
         own = edges[cutter.number]
         if not cutter.teeth or cutter.helix is None or own.material is None:
             continue
-        laws[of, 0] = toolpath.feed[sweeps.motion[of]] * (2 * np.pi / (speed[of] * cutter.teeth))
+        laws[of, 0] = toolpath.feed[sweeps.motion[of]] * (2 * np.pi / (np.abs(speed[of]) * cutter.teeth))
         known = own.material.coefficients
         laws[of, 1:] = [cutter.teeth, np.sign(cutter.helix), *known.cutting, *known.edge]
+        # the other way round a left-hand helix pulls, and the tangential force is turned
+        back = of[speed[of] < 0]
+        laws[np.ix_(back, [2, 3, 6])] *= -1.0
     laws[~(laws[:, 0] > 0), 0] = np.nan
     return laws
 
 
 def speeds_of(sweeps: MotionSweeps, toolpath: Toolpath, edges: dict[int, Edges]) -> Floats:
-    """(M,) [rad/s] the speed of the spindle: that of the process file, where it states none that of the program."""
+    """(M,) [rad/s] the speed of the spindle: that of the process file, where it states none that of the program; below
+    zero where the program turns it counter-clockwise."""
     stated = np.array([edges[cutter.number].speed or np.nan for cutter in sweeps.cutters])[sweeps.which]
-    return np.where(np.isnan(stated), toolpath.spindle[sweeps.motion], stated)
+    program = toolpath.spindle[sweeps.motion]
+    known = np.where(np.isfinite(program) & (program != 0), np.abs(program), np.nan)
+    return np.where(program < 0, -1.0, 1.0) * np.where(np.isnan(stated), known, stated)
 
 
 def _uneven(sweep: Ints, rate: Floats) -> Ints:

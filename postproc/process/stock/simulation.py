@@ -168,7 +168,7 @@ def unknown_forces(run: StockRun, toolpath: Toolpath, program: str, code: str) -
         if not len(rows):
             continue
         own = run.process.edges[cutter.number]
-        turns = own.speed is not None or not np.isnan(toolpath.spindle[rows]).any()
+        turns = own.speed is not None or _turns(toolpath.spindle[rows]).all()
         stated = {
             "teeth": cutter.teeth,
             "helix": cutter.helix,
@@ -182,6 +182,11 @@ def unknown_forces(run: StockRun, toolpath: Toolpath, program: str, code: str) -
         where = (program, int(toolpath.line[rows[0]])) if of_program else (str(run.process.path), cutter.line)
         findings.append(Finding(code, message, *where))
     return findings
+
+
+def _turns(speed: Floats) -> Bools:
+    """(K,) speeds of a program that are known and not zero."""
+    return np.isfinite(speed) & (speed != 0)
 
 
 def _summaries(run: StockRun, toolpath: Toolpath, path: Path) -> list[Finding]:
@@ -276,13 +281,24 @@ def _speeds(
     findings = []
     for index, cutter in enumerate(sweeps.cutters):
         rows = np.unique(sweeps.motion[sweeps.which == index])
-        rows = rows[cuts[rows] & ~np.isnan(toolpath.spindle[rows])]
+        rows = rows[cuts[rows]]
+        back, stands = rows[toolpath.spindle[rows] < 0], rows[toolpath.spindle[rows] == 0]
+        if len(back):
+            message = (
+                f"the program turns the spindle counter-clockwise in {len(back)} motions that cut: tool"
+                f" {cutter.number} is taken for one that cuts so"
+            )
+            findings.append(Finding("STK022", message, program, int(toolpath.line[back[0]])))
+        if len(stands):
+            message = f"tool {cutter.number} cuts in {len(stands)} motions after the program stops the spindle"
+            findings.append(Finding("STK023", message, program, int(toolpath.line[stands[0]])))
+        rows = rows[_turns(toolpath.spindle[rows])]
         stated = process.edges[cutter.number].speed
         if stated is not None:
-            rows = rows[np.abs(toolpath.spindle[rows] - stated) > _SAME_SPEED * stated]
+            rows = rows[np.abs(np.abs(toolpath.spindle[rows]) - stated) > _SAME_SPEED * stated]
         if not len(rows):
             continue
-        turns = np.unique(np.round(toolpath.spindle[rows] * 30 / np.pi, 3))
+        turns = np.unique(np.round(np.abs(toolpath.spindle[rows]) * 30 / np.pi, 3))
         words = f"{turns[0]:g}" if len(turns) == 1 else f"{turns[0]:g} to {turns[-1]:g}"
         line = int(toolpath.line[rows[0]])
         if stated is None:
