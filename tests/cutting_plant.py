@@ -104,7 +104,11 @@ def flat_force(wall, floor, recent, tip, axis, feed, radius, chip, teeth, out):
             phi = 0.5 * (first + last)
             s, co = np.sin(phi), np.cos(phi)
             scale = (last - first) * dz * teeth / (2 * np.pi)
-            t, r, ax = (KTC * chip * s + KTE) * scale, (KRC * chip * s + KRE) * scale, (KAC * chip * s + KAE) * scale
+            t, r, ax = (
+                (KTC * chip * s + KTE) * scale,
+                (KRC * chip * s + KRE) * scale,
+                (KAC * chip * s + KAE) * scale,
+            )
             f[0], f[1], f[2] = -t * co - r * s, t * s - r * co, -ax
             px, py = radius * s, radius * co
             mx, my, mz = py * f[2] - h * f[1], h * f[0] - px * f[2], px * f[1] - py * f[0]
@@ -177,7 +181,9 @@ def remove_flat(wall, floor, tip0, axis0, tip1, axis1, radius):
     for q in range(count):
         s = q / (count - 1)
         tip, axis = tip0 + s * (tip1 - tip0), axis0 + s * (axis1 - axis0)
-        for i in range(max(int((tip[0] - radius) / 0.1), 0), min(int((tip[0] + radius) / 0.1) + 2, len(wall))):
+        for i in range(
+            max(int((tip[0] - radius) / 0.1), 0), min(int((tip[0] + radius) / 0.1) + 2, len(wall))
+        ):
             for k in range(wall.shape[1]):
                 up = (-0.05 * k - tip[2]) / axis[2]
                 if up < 0:
@@ -188,7 +194,9 @@ def remove_flat(wall, floor, tip0, axis0, tip1, axis1, radius):
                     wall[i, k] = max(wall[i, k], reach)
         if q % 4 and q < count - 1:
             continue
-        for i in range(max(int((tip[0] - radius) / 0.25), 0), min(int((tip[0] + radius) / 0.25) + 2, len(floor))):
+        for i in range(
+            max(int((tip[0] - radius) / 0.25), 0), min(int((tip[0] + radius) / 0.25) + 2, len(floor))
+        ):
             first = max(int((tip[1] - radius) / 0.25), 0)
             for j in range(first, min(int((tip[1] + radius) / 0.25) + 2, floor.shape[1])):
                 dx, dy = 0.25 * i - tip[0], 0.25 * j - tip[1]
@@ -294,7 +302,10 @@ class Arm:
         here = self.displaced(q, wrench)
         sizes = np.array([20, 20, 20, 400, 400, 400.0])
         slope = np.array(
-            [(self.displaced(q, wrench + s * e) - self.displaced(q, wrench - s * e)) / (2 * s) for s, e in zip(sizes, np.eye(6))]
+            [
+                (self.displaced(q, wrench + s * e) - self.displaced(q, wrench - s * e)) / (2 * s)
+                for s, e in zip(sizes, np.eye(6))
+            ]
         ).T
         return here - slope @ wrench, slope
 
@@ -317,7 +328,9 @@ class Machine:
         for move in moves_of(text):
             step = move.points[-1] - move.points[0]
             cuts = not move.rapid and move.points[:, 2].min() < 1.0
-            turned = before is not None and before @ step < 0.5 * np.linalg.norm(before) * np.linalg.norm(step)
+            turned = before is not None and before @ step < 0.5 * np.linalg.norm(before) * np.linalg.norm(
+                step
+            )
             if not cuts or turned:
                 self._end(chain)
                 chain = []
@@ -346,7 +359,9 @@ class Machine:
         for index in range(len(points)):
             node = min(np.searchsorted(at, along[index], side="right") - 1, many - 1)
             s = (along[index] - at[node]) / (at[node + 1] - at[node])
-            base, slope = ((1 - s) * one + s * other for one, other in zip(lines[node], lines[node + 1], strict=True))
+            base, slope = (
+                (1 - s) * one + s * other for one, other in zip(lines[node], lines[node + 1], strict=True)
+            )
             feed = points[min(index + 1, len(points) - 1)] - points[max(index - 1, 0)]
             feed = feed / np.linalg.norm(feed)
             fresh = index == 0 and chain and chain[-1][0] == move.tool

@@ -89,7 +89,9 @@ def test_the_other_way_round_is_the_mirror_image(folder):
         row = list(csv.DictReader((folder / "out.csv").read_text().splitlines()))[3]
         forces.append([float(row[k]) for k in ("fx_n", "fy_n", "fz_n", "mx_nm", "my_nm", "mz_nm", "power_w")])
     assert abs(forces[0][1]) > 50
-    np.testing.assert_allclose(np.array(forces[1]) * [1, -1, 1, -1, 1, -1, 1], forces[0], rtol=1e-3, atol=0.01)
+    np.testing.assert_allclose(
+        np.array(forces[1]) * [1, -1, 1, -1, 1, -1, 1], forces[0], rtol=1e-3, atol=0.01
+    )
 
 
 def test_a_cut_with_a_spindle_that_stands_is_reported(folder):

@@ -29,7 +29,9 @@ def reported(tmp_path_factory, pytestconfig):
     parts, find = [], postproc.part.part_error.find_part_error
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            postproc.part.part_error, "find_part_error", lambda *a, **k: parts.append(find(*a, **k)) or parts[-1]
+            postproc.part.part_error,
+            "find_part_error",
+            lambda *a, **k: parts.append(find(*a, **k)) or parts[-1],
         )
         compensate(Request(program, force=""))
     return program, prepare(Request(program, force="")).task, parts[-1]
@@ -55,14 +57,14 @@ def compare(machine, part, side):
 
 @pytest.mark.slow
 def test_the_part_as_posted_is_the_one_that_the_machine_cuts(reported):
-    """Engagement and deflection of 2.4 mm: the wall within 0.5 %, the floor 1 um, the wave 3 um but at its rims."""
+    """Engagement and deflection of 2.4 mm: the wall within 1 %, the floor 1 um, the wave 3 um but at its rims."""
     program, task, part = reported
     machine = cut(task, program)
     assert machine.largest == pytest.approx(part.figures.as_posted.force, rel=0.01)
     found = compare(machine, part, part.before)
     error, true = found["wall"]
     assert np.abs(true).max() > 2
-    assert np.percentile(np.abs(error - true), 90) < 0.005 * np.abs(true).max()
+    assert np.percentile(np.abs(error - true), 90) < 0.01 * np.abs(true).max()
     error, true = found["floor"]
     assert np.abs(true).max() > 0.09
     assert np.percentile(np.abs(error - true), 95) < 1e-3

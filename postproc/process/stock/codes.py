@@ -190,5 +190,13 @@ CODES = define(
             action="Check M3 and M5.",
             example="`M5` before the last pass.",
         ),
+        "STK024": Code(
+            "warning",
+            "feed per tooth is implausible",
+            meaning="The feed per tooth is below 0.0005 mm, or above a fifth of the diameter.",
+            consequence="Feed or speed have probably another unit than stated, and the forces are as wrong.",
+            action="Compare F, its unit (G94, G95, mm, inches), S and the number of teeth with the machine.",
+            example="`F3.6`, meant in m/min, at 12000 1/min: 0.0001 mm per tooth.",
+        ),
     }
 )

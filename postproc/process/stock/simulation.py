@@ -16,7 +16,7 @@ from postproc.process.stated_forces import BASE, FEED, StatedForces
 from postproc.process.stock.blank import Blank, box_blank, corners_of, cylinder_blank, mesh_blank
 from postproc.process.stock.cutters import CUTTING, HOLDER, SHANK
 from postproc.process.stock.distance import AXIS, CUTTER, REMOVES, STEP, TIP_POINT, TURN
-from postproc.process.stock.engagement import EngagedMotions, engage
+from postproc.process.stock.engagement import EngagedMotions, engage, laws_of
 from postproc.process.stock.motion_sweeps import MotionSweeps, find_sweeps
 from postproc.process.stock.saved_stock import Removed, read_stock, stock_bytes
 from postproc.process.stock.stl import read_stl
@@ -28,6 +28,8 @@ _PARTS = {CUTTING: "the cutter", SHANK: "the shank", HOLDER: "the holder"}
 _MOST_FINDINGS = 20
 _NO_MOVE = 1e-7  # m
 _SAME_SPEED = 0.001
+_LEAST_CHIP, _LARGEST_CHIP = 0.0005 * MM, 0.2
+"""[m] and of the diameter: feeds per tooth beyond have another unit than it seems."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +77,9 @@ def simulate(path: Path, toolpath: Toolpath, frames: MotionFrames, program: str)
         *_not_simulated(sweeps, toolpath, program),
         *_lengths(sweeps, process),
         *_commented(sweeps, commented, program),
+        *_implausible_chips(
+            sweeps, laws_of(sweeps, toolpath, edges)[:, 0], engagement.cuts, toolpath, program
+        ),
         *_speeds(sweeps, engagement.cuts, process, toolpath, program),
     ]
     return StockRun(process, toolpath, blank, before, sweeps, engagement, ci95, tuple(findings))
@@ -274,6 +279,25 @@ def _commented(sweeps: MotionSweeps, commented: Mapping[int, CommentedTool], pro
     return findings
 
 
+def _implausible_chips(
+    sweeps: MotionSweeps, chip: Floats, cuts: Bools, toolpath: Toolpath, program: str
+) -> list[Finding]:
+    """One finding for each tool; chip (M,) [m]: feed per tooth of the sweeps."""
+    findings = []
+    for index, cutter in enumerate(sweeps.cutters):
+        own = (sweeps.which == index) & cuts[sweeps.motion]
+        wrong = own & ((chip < _LEAST_CHIP) | (chip > _LARGEST_CHIP * 2 * cutter.radius))
+        if not wrong.any():
+            continue
+        at = int(np.argmax(wrong))
+        message = (
+            f"tool {cutter.number} has a feed per tooth of {chip[at] / MM:.3g} mm here, and in"
+            f" {len(np.unique(sweeps.motion[wrong]))} motions that cut an implausible one"
+        )
+        findings.append(Finding("STK024", message, program, int(toolpath.line[sweeps.motion[at]])))
+    return findings
+
+
 def _speeds(
     sweeps: MotionSweeps, cuts: Bools, process: StockProcess, toolpath: Toolpath, program: str
 ) -> list[Finding]:
@@ -290,7 +314,9 @@ def _speeds(
             )
             findings.append(Finding("STK022", message, program, int(toolpath.line[back[0]])))
         if len(stands):
-            message = f"tool {cutter.number} cuts in {len(stands)} motions after the program stops the spindle"
+            message = (
+                f"tool {cutter.number} cuts in {len(stands)} motions after the program stops the spindle"
+            )
             findings.append(Finding("STK023", message, program, int(toolpath.line[stands[0]])))
         rows = rows[_turns(toolpath.spindle[rows])]
         stated = process.edges[cutter.number].speed
