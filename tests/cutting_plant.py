@@ -1,16 +1,17 @@
 """A machine that cuts: the arm of ``plant`` on MuJoCo with a tool, a step of stock and a cutting law of its own.
 
-The stock is kept as fields, nothing as a list of sweeps: of flat tools the wall, the Y up to which they have come at each
-(x, z), and the floor, the height that they left at each (x, y); of a ball the height at each (x, y).  At every step along
-the program the tool is where the arm settles under the force that the tool meets there, and the force is summed over
-angles and heights of its surface that lie in what the fields hold: both are found together, again and again, step by
-step.  Lengths in mm, forces in N, moments in N mm.
+The stock is kept as fields, nothing as a list of sweeps: of flat tools the wall, the Y up to which they have come at
+each (x, z), and the floor, the height that they left at each (x, y); of a ball the height at each (x, y).  At every
+step along the program the tool is where the arm settles under the force that the tool meets there, and the force is
+summed over angles and heights of its surface that lie in what the fields hold: both are found together, step by step.
+Lengths in mm, forces in N, moments in N mm.
 """
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numba import njit
@@ -251,7 +252,7 @@ def moves_of(text):
         share = np.linspace(0, 1, count + 1)[:, None]
         points = start + share * (end - start)
         if code == 2:
-            middle = start[:2] + [float(given.get("I", 0)), float(given.get("J", 0))]
+            middle = start[:2] + np.array([float(given.get(letter, 0)) for letter in "IJ"])
             ends = [np.arctan2(*(p[:2] - middle)[::-1]) for p in (start, end)]
             sweep = (ends[0] - ends[1]) % (2 * np.pi)
             radius = np.linalg.norm(start[:2] - middle)
@@ -304,7 +305,7 @@ class Arm:
         slope = np.array(
             [
                 (self.displaced(q, wrench + s * e) - self.displaced(q, wrench - s * e)) / (2 * s)
-                for s, e in zip(sizes, np.eye(6))
+                for s, e in zip(sizes, np.eye(6), strict=True)
             ]
         ).T
         return here - slope @ wrench, slope
@@ -341,7 +342,7 @@ class Machine:
 
     def _end(self, chain):
         """The fields of a flat tool after a run of moves in one direction."""
-        for (tool, *one), (_, *other) in zip(chain[:-1], chain[1:], strict=True):
+        for (tool, *one), (_, *other) in pairwise(chain):
             if tool == 1:
                 remove_flat(self.wall, self.floor, *one, *other, self.tools[1][0])
 

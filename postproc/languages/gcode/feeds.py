@@ -64,9 +64,9 @@ class Feeds:
         return np.asarray(result / 60.0)
 
     def speeds(self, blocks: Ints) -> Floats:
-        """(N,) [rad/s] of the spindle in blocks of the program (N,): the S that is in force, below zero after M4, 0 after
-        M5; NaN, after M4 -inf, where no S is, at a constant surface speed, and where an S may be the limit of a block
-        that shifts the origin (G92 S)."""
+        """(N,) [rad/s] of the spindle in blocks of the program (N,): the S that is in force, below zero after M4, 0
+        after M5; NaN, after M4 -inf, where no S is, at a constant surface speed, and where an S may be the limit of a
+        block that shifts the origin (G92 S)."""
         column, keep = self._spindle, ~self._given.modal.has(Once.SHIFT)[self._spindle.block]
         stated = WordColumn(column.block[keep], column.value[keep], column.how[keep])
         _, turns = _latest(stated, blocks)

@@ -168,7 +168,8 @@ def laws_of(sweeps: MotionSweeps, toolpath: Toolpath, edges: dict[int, Edges]) -
         laws[of, 1:] = [cutter.teeth, np.sign(cutter.helix), *known.cutting, *known.edge]
         # the other way round a left-hand helix pulls, and the tangential force is turned
         back = of[speed[of] < 0]
-        laws[np.ix_(back, [2, 3, 6])] *= -1.0
+        for column in (2, 3, 6):
+            laws[back, column] *= -1.0
     laws[~(laws[:, 0] > 0), 0] = np.nan
     return laws
 
@@ -197,8 +198,9 @@ def _in_order(sweep: Ints, weight: Floats, found: Floats) -> tuple[Ints, Floats,
 
 
 def _missed(sweep: Ints, rate: Floats, look: Callable[[Ints, Floats], Floats]) -> Ints:
-    """The sweeps with an end that cuts, or does not, unlike the place (K,) next to it: a plunge that just reaches stock,
-    or one that starts just above.  Where a sweep that cuts goes on in one that does, its end is not looked at."""
+    """The sweeps with an end that cuts, or does not, unlike the place (K,) next to it: a plunge that just reaches
+    stock, or one that starts just above.  Where a sweep that cuts goes on in one that does, its end is not looked
+    at."""
     if not len(sweep):
         return sweep
     cuts, change = rate > LEAST_AREA, sweep[1:] != sweep[:-1]

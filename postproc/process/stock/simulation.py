@@ -191,7 +191,7 @@ def unknown_forces(run: StockRun, toolpath: Toolpath, program: str, code: str) -
 
 def _turns(speed: Floats) -> Bools:
     """(K,) speeds of a program that are known and not zero."""
-    return np.isfinite(speed) & (speed != 0)
+    return np.asarray(np.isfinite(speed) & (speed != 0))
 
 
 def _summaries(run: StockRun, toolpath: Toolpath, path: Path) -> list[Finding]:
