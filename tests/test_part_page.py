@@ -1,6 +1,7 @@
 """The part on the page of a program: the numbers that its script draws, the robot, and what a browser shows."""
 
 import base64
+import importlib.util
 import json
 import re
 import shutil
@@ -238,3 +239,26 @@ def test_the_browser_follows_the_same_chain(window, page):
     np.testing.assert_allclose(
         np.reshape(flange, (3, 4)), followed(scene, scene["robot"], values)[:3], atol=1e-6
     )
+
+
+@pytest.mark.slow
+def test_the_picture_of_the_sample_is_what_the_page_shows(window, page, pytestconfig):
+    """Both halves of part.png, in squares of 10 pixels."""
+    from PIL import Image
+
+    shown = window(page[0])
+    if shown.page.eval_on_selector("#part-live", "e => e.hidden"):
+        pytest.skip("this Chromium has no WebGL 2")
+    shown.page.close()
+    folder = pytestconfig.rootpath / SAMPLE
+    script = importlib.util.spec_from_file_location("draw_part", folder / "draw_part.py")
+    draw_part = importlib.util.module_from_spec(script)
+    script.loader.exec_module(draw_part)
+    kept = Image.open(folder / "part.png").convert("RGB")
+    for index, shot in enumerate(draw_part.photograph(page[0])):
+        wide, high = shot.size
+        assert kept.size == (2 * wide, high)
+        half = kept.crop((index * wide, 0, (index + 1) * wide, high))
+        small = [np.asarray(one.reduce(10), float) for one in (shot, half)]
+        assert np.abs(small[0] - small[1]).mean() < 3
+        assert (np.abs(small[0] - small[1]).max(axis=2) > 40).mean() < 0.01

@@ -38,11 +38,11 @@ def _beyond_tolerance(part: PartError, file: str) -> tuple[Finding, ...]:
     if after is None or abs(after.worst.error) <= tolerance:
         return ()
     worst = after.worst
-    kind = "excess" if worst.error > 0 else "gouge"
+    kind = "an excess" if worst.error > 0 else "a gouge"
     place = ", ".join(f"{value / MM:.1f}" for value in worst.position)
     message = (
         f"as compensated {100 * after.whole.out:.1f} % of the surface of the part exceeds the tolerance"
-        f" {tolerance / MM:g} mm; the worst is a {kind} of {abs(worst.error) / MM:.3f} mm at {place} (mm, axes of the"
+        f" {tolerance / MM:g} mm; the worst is {kind} of {abs(worst.error) / MM:.3f} mm at {place} (mm, axes of the"
         " stock)"
     )
     return (Finding("PRT002", message, file, worst.line),)
