@@ -21,6 +21,8 @@ LEVER = 40 * MM
 class Springs:
     """A robot whose tool yields by ``compliance`` (3, 3) [m/N] times the force, everywhere the same."""
 
+    division = None
+
     def __init__(self, count, compliance):
         self.compliance, self.traceable = compliance, np.ones(count, bool)
         nothing = SimpleNamespace(along=lambda motion, share: np.zeros((len(motion), 6)))

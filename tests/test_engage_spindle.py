@@ -69,4 +69,33 @@ def test_modal_words():
     lines = ["G21 G90 G94 F100", "G1 X1", "S600 M3", "G1 X2", "G4 S5", "G1 X3", "M5", "G1 X4", "M3", "G1 X5"]
     text = "\n".join([*lines, "S300 G1 X6", "G96 S20", "G1 X7", "M2", ""])
     turns = read(text).toolpath.spindle * 30 / np.pi
-    np.testing.assert_allclose(turns, [np.nan, 600, 600, np.nan, 600, 300, np.nan])
+    np.testing.assert_allclose(turns, [np.nan, 600, 600, 0, 600, 300, np.nan])
+    turns = read("G21 G90 G94 F100\nM4\nG1 X1\nS600\nG1 X2\nM3 G1 X3\nM2\n").toolpath.spindle * 30 / np.pi
+    np.testing.assert_allclose(turns, [-np.inf, -600, 600])
+
+
+def test_the_other_way_round_is_the_mirror_image(folder):
+    """Blank, path and hand of the tool mirrored in the plane of feed and spindle: so are force and moment."""
+    forces = []
+    for y, helix, switch in ((22.5, 30, "S12000 M3"), (37.5, -30, "S12000 M4")):
+        box = [[0, 22.5, -30], [100, 60, 0]] if y == 22.5 else [[0, 0, -30], [100, 37.5, 0]]
+        tool = TOOL.replace("helix: 30", f"helix: {helix}")
+        state(folder, f"stock: {{box: {box}}}\n" + tool % "" + ALLOY)
+        (folder / "part.ngc").write_text((SLOT % (switch, "")).replace("Y30", f"Y{y}"))
+        result = json.loads(
+            call(folder, "--csv", folder / "out.csv", "--json", "-", code=0 if helix > 0 else 3).stdout
+        )
+        assert any(one["code"] == "STK022" for one in result["findings"]) == (helix < 0)
+        row = list(csv.DictReader((folder / "out.csv").read_text().splitlines()))[3]
+        forces.append([float(row[k]) for k in ("fx_n", "fy_n", "fz_n", "mx_nm", "my_nm", "mz_nm", "power_w")])
+    assert abs(forces[0][1]) > 50
+    np.testing.assert_allclose(
+        np.array(forces[1]) * [1, -1, 1, -1, 1, -1, 1], forces[0], rtol=1e-3, atol=0.01
+    )
+
+
+def test_a_cut_with_a_spindle_that_stands_is_reported(folder):
+    state(folder, STOCK + TOOL % ", spindle: 12000" + ALLOY)
+    (folder / "part.ngc").write_text(SLOT % ("S12000 M3", "M5"))
+    result = json.loads(call(folder, "--json", "-", code=3).stdout)
+    assert [one["line"] for one in result["findings"] if one["code"] == "STK023"] == [8]

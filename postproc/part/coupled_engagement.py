@@ -74,7 +74,8 @@ class CoupledEngagement:
     def along(self, motion: Ints, share: Floats) -> Floats:
         """(K, 6) [N, N m] the wrench at the shares (K,) of motions (K,); zero where nothing was solved."""
         at = 2.0 * motion + share
-        after = np.clip(np.searchsorted(self.key, at), 1, len(self.key) - 1)
+        # from the right: the start of a motion belongs to it, not to the end of the one before
+        after = np.clip(np.searchsorted(self.key, at, side="right"), 1, len(self.key) - 1)
         low, high = self.key[after - 1], self.key[after]
         within = np.clip((at - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)[:, None]
         known = (np.floor(low / 2) == motion) & (at <= high + 1e-9)
@@ -90,7 +91,7 @@ class CoupledEngagement:
 def solve_coupled(
     run: StockRun, paths: Paths, displaced: Displacements, lever: float
 ) -> CoupledEngagement | str:
-    """The engagement of ``paths`` with tools that ``displaced`` (as posted) says, or why it is not known."""
+    """The engagement of ``paths`` with tools that ``displaced`` says, or why it is not known."""
     task = displaced.task
     rows, owner, part = _pieces(run, paths)
     if len(rows) > MOST_PIECES:
@@ -107,7 +108,8 @@ def solve_coupled(
     at_motion[start[fresh]], at_share[start[fresh]] = motion[fresh], share[fresh, 0]
 
     wrench, to_stock = task.force.along(at_motion, at_share), displaced.to_stock(at_motion)
-    slack, solved, known = _LEAST, None, 0
+    # a correction brings the tool near to the nominal engagement, whose wrenches these are
+    slack, solved, known = _LEAST, None, int(displaced.division is not None)
     for _ in range(_ROUNDS):
         base, slope = _linear(displaced, at_motion, at_share, wrench, to_stock)
         if not (np.isfinite(base).all() and np.isfinite(slope).all()):

@@ -19,7 +19,7 @@ from postproc.part.deflected_sweeps import Displacement, axes_of, deflect, tips_
 from postproc.part.displacement import Displacements
 from postproc.part.part_figures import (
     FEATURES,
-    AsPosted,
+    CutForces,
     ErrorFigures,
     PartError,
     PartFigures,
@@ -74,9 +74,9 @@ def find_part_error(
 ) -> PartError | Finding:
     """The error of the part that ``task`` leaves in the stock of ``run``, at about ``count`` points.
 
-    As posted, with engagement and displacement solved together, unless ``as_nominal`` says why the forces of the task
-    are taken there too; and with ``division`` as compensated, under the forces of the task.  PRT001 where it is not
-    known, and why.
+    As posted, and with ``division`` as compensated: both with engagement and displacement solved together, unless
+    ``as_nominal`` says why the forces of the task are taken.  A correction follows the forces of the task, which are
+    even along a motion; what is met at entries, exits and corners is not.  PRT001 where it is not known, and why.
     """
     nominal = _nominal(run, count)
     if not len(nominal.own):
@@ -89,13 +89,14 @@ def find_part_error(
         lost = cutting[~task.desired_path.traceable[cutting]]
         if len(lost):
             raise _UnknownDisplacement(lost)
-        posted = as_nominal or solve_coupled(run, paths, displaced, nominal.lever)
-        if isinstance(posted, str):
-            sides = [_side(nominal, displaced, paths)]
-        else:
-            sides = [_side(nominal, replace(displaced, wrench=posted.along), posted.pieces)]
-        if division is not None:
-            sides.append(_side(nominal, replace(displaced, division=division), paths))
+        every = [displaced] if division is None else [displaced, replace(displaced, division=division)]
+        solved = [as_nominal or solve_coupled(run, paths, one, nominal.lever) for one in every]
+        sides = [
+            _side(nominal, one, paths)
+            if isinstance(forces, str)
+            else _side(nominal, replace(one, wrench=forces.along), forces.pieces)
+            for one, forces in zip(every, solved, strict=True)
+        ]
     except _UnknownDisplacement as unknown:
         lost = unknown.args[0]
         message = f"the displacement of the tool is not known in {len(lost)} motions that reach the part"
@@ -111,21 +112,22 @@ def find_part_error(
         None if division is None else whole[1],
         _groups(FEATURES, nominal.feature, nominal, sides, task),
         _groups(*_operations(nominal), nominal, sides, task),
-        _as_posted(task, nominal, posted),
+        _cut_forces(task, nominal, solved[0]),
+        None if division is None else _cut_forces(task, nominal, solved[1]),
     )
     after = None if division is None else sides[1]
-    forces = None if isinstance(posted, str) else posted.along
-    return PartError(figures, nominal.surface, nominal.own, sides[0], after, forces)
+    wrenches = [None if isinstance(forces, str) else forces.along for forces in solved]
+    return PartError(figures, nominal.surface, nominal.own, sides[0], after, (wrenches[0], wrenches[-1]))
 
 
-def _as_posted(task: CompensationProblem, nominal: _Nominal, posted: CoupledEngagement | str) -> AsPosted:
-    """The forces as posted against those of the nominal engagement."""
+def _cut_forces(task: CompensationProblem, nominal: _Nominal, solved: CoupledEngagement | str) -> CutForces:
+    """The forces of a side against those of the nominal engagement."""
     motions = np.unique(nominal.paths.motion)
     ends = [task.force.along(motions, np.full(len(motions), share)) for share in (0.0, 1.0)]
     largest = float(lengths(np.concatenate(ends)[:, :3]).max(initial=0.0))
-    if isinstance(posted, str):
-        return AsPosted(posted, largest, None, None)
-    return AsPosted("", largest, posted.largest, posted.residual)
+    if isinstance(solved, str):
+        return CutForces(solved, largest, None, None)
+    return CutForces("", largest, solved.largest, solved.residual)
 
 
 def _nominal(run: StockRun, count: int) -> _Nominal:

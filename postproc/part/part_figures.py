@@ -9,6 +9,8 @@ import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 
+WrenchAlong = Callable[[Ints, Floats], Floats]
+
 FEATURES = ("floor", "wall", "slope")
 """By the angle of the normal to the spindle of the motion that made the surface: to 10 deg, from 80 deg, between."""
 
@@ -74,10 +76,10 @@ class SurfaceGroup:
 
 
 @dataclass(frozen=True)
-class AsPosted:
-    """What is known of the forces as posted, where the robot yields and cuts less than it is meant to.  nominal: why
-    they are those of the nominal engagement, "" where they were solved together with the displacement; force_nominal,
-    force [N]: the largest of both; residual [m]: what remains between both displacements of a place."""
+class CutForces:
+    """What is known of the forces of a side, under which the robot yields and cuts more or less than it is meant to.
+    nominal: why they are those of the nominal engagement, "" where they were solved together with the displacement;
+    force_nominal, force [N]: the largest of both; residual [m]: what remains between both displacements of a place."""
 
     nominal: str
     force_nominal: float
@@ -88,7 +90,7 @@ class AsPosted:
 @dataclass(frozen=True)
 class PartFigures:
     """points that the program makes, their grid's spacing [m], their area [m2]; tolerance [m]; as posted, and as
-    compensated where it is; features and operations: those that have points."""
+    compensated where it is; features and operations: those that have points; as_posted, as_compensated: forces."""
 
     points: int
     spacing: float
@@ -98,7 +100,8 @@ class PartFigures:
     after: SideFigures | None
     features: tuple[SurfaceGroup, ...]
     operations: tuple[SurfaceGroup, ...]
-    as_posted: AsPosted
+    as_posted: CutForces
+    as_compensated: CutForces | None
 
     @property
     def sides(self) -> tuple[tuple[str, SideFigures], ...]:
@@ -140,15 +143,15 @@ class PartSide:
 @dataclass(frozen=True, eq=False)
 class PartError:
     """The error of a part: ``figures``, the ``surface`` with its points that are ``own`` (K,) to the program, and the
-    errors there as posted, and as compensated where it is.  posted_wrench: of motions (K,) at shares (K,) the wrench
-    (K, 6) as posted, None where it is that of the task."""
+    errors there as posted, and as compensated where it is.  wrenches: of both sides, of motions (K,) at shares (K,) the
+    wrench (K, 6), None where it is that of the task."""
 
     figures: PartFigures
     surface: Surface
     own: Ints
     before: PartSide
     after: PartSide | None
-    posted_wrench: Callable[[Ints, Floats], Floats] | None = None
+    wrenches: tuple[WrenchAlong | None, WrenchAlong | None] = (None, None)
 
     def vertex_errors(self, side: PartSide) -> Floats:
         """(V,) [m] the largest error, with its sign, around each vertex of the mesh; NaN where the blank is left."""

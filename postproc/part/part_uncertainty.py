@@ -52,12 +52,12 @@ def with_uncertainty(
     known = input_uncertainties(task.model, force.largest, bool(task.carries.any()), stated.vector)
     if not known.entries:
         return part
-    displaced = Displacements(task, run.sweeps.in_stock, wrench=part.posted_wrench)
+    displaced = Displacements(task, run.sweeps.in_stock, wrench=part.wrenches[0])
     figures = part.figures
     before = replace(figures.before, ci95=_interval(part, part.before, displaced, known, force))
     after = figures.after
     if after is not None and part.after is not None:
-        displaced = replace(displaced, division=division, wrench=None)
+        displaced = replace(displaced, division=division, wrench=part.wrenches[1])
         after = replace(after, ci95=_interval(part, part.after, displaced, known, force))
     return replace(part, figures=replace(figures, before=before, after=after))
 

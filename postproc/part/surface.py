@@ -124,11 +124,11 @@ def _cross(
                 fa *= 0.5
         points[e] = to
         owner = nearest_sweep(stock, to[0], to[1], to[2], time, 0.0)[1]
-        sweep[e] = owner if _outward(stock, to, normals[e]) else -1
+        sweep[e] = owner if outward(stock, to, normals[e]) else -1
 
 
 @compiled
-def _outward(stock: Stock, at: Floats, normal: Floats) -> bool:
+def outward(stock: Stock, at: Floats, normal: Floats) -> bool:
     """The unit ``normal`` (3,) out of the material at the point ``at`` (3,) [m]; False on an edge, which has none."""
     time = len(stock.sweeps)
     to = at.copy()

@@ -2,8 +2,8 @@
 
 At a point p with the outward normal n of the meant surface the error is the s at which p + s n lies on the surface that
 is left: above zero where material remains, below where too much is gone.  The distance to what is left is exact at any
-point, so the error is too.  Near an edge the normal may not meet the other surface at all; there the error is the
-distance to it, which never exceeds what the tool was displaced by.
+point, so the error is too.  Near an edge the normal may not meet that surface at all, but another one; there the error
+is the distance to what is nearest.  Neither exceeds what the tool was displaced by.
 """
 
 from __future__ import annotations
@@ -14,13 +14,15 @@ import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 from postproc.base.batches import each_block
+from postproc.part.surface import outward
 from postproc.process.stock.cells import Stock, build_stock, nearest_sweep
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.distance import pose_distance
 
 _EXACT = 1e-10  # m
 _STEEP = 1.2
-"""A normal that is longer than this many distances to the surface does not meet it where it belongs."""
+"""A normal that is longer than this many distances to the surface does not meet it where it belongs, unless the surface
+there faces as the one that is meant: their normals have the inverse as the least cosine."""
 
 _GOLDEN = 0.6180339887498949
 
@@ -52,6 +54,7 @@ def find_errors(nominal: Stock, rows: Floats, reach: float, points: Floats, norm
 @compiled
 def _errors(stock: Stock, points: Floats, normals: Floats, error: Floats, sweep: Ints, share: Floats) -> None:
     time, reach = len(stock.sweeps), stock.grid[1]
+    at, there = np.zeros(3), np.zeros(3)
     for i in range(len(points)):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
@@ -59,14 +62,17 @@ def _errors(stock: Stock, points: Floats, normals: Floats, error: Floats, sweep:
         nearest, first = f, owner
         s = 0.0
         for _ in range(60):
-            if abs(f) < _EXACT:
+            if abs(f) < _EXACT or abs(s) > reach:
                 break
             s += f  # never beyond the surface: the distance changes by at most the step
             f, owner = nearest_sweep(stock, x + s * nx, y + s * ny, z + s * nz, time, reach)
-            if abs(s) > _STEEP * abs(nearest) + _EXACT:
-                break
-        if abs(s) > _STEEP * abs(nearest) + _EXACT or abs(f) >= _EXACT:
+        if abs(s) > reach or abs(f) >= _EXACT:
             s, owner = nearest, first
+        elif abs(s) > _STEEP * abs(nearest) + _EXACT:
+            at[0], at[1], at[2] = x + s * nx, y + s * ny, z + s * nz
+            smooth = outward(stock, at, there)
+            if not smooth or there[0] * nx + there[1] * ny + there[2] * nz < 1.0 / _STEEP:
+                s, owner = nearest, first
         error[i], sweep[i] = s, owner
         share[i] = np.nan if owner < 0 else nearest_share(stock, owner, x + s * nx, y + s * ny, z + s * nz)
 

@@ -304,6 +304,14 @@ FORCE_CODES = define(
             action="Log the forces of the compensated program and compensate the original again with them.",
             example="Logged on a robot of 1 um/N, finishing with ae 0.5 mm: 6 % too small.",
         ),
+        "FRC033": Code(
+            "error",
+            "spindle turns counter-clockwise",
+            meaning="An operation of the process file cuts after M4.",
+            consequence="Its forces are those of a spindle that turns clockwise: sideways they point the other way.",
+            action="Check M3 and M4; state the force, or blank and tools, for which both directions are computed.",
+            example="`S12000 M4` before a cut with `direction: down`.",
+        ),
     }
 )
 CODES = {**FORCE_CODES, **STOCK_CODES}

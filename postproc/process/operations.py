@@ -36,7 +36,7 @@ def process_forces(
     Air, with no force, are: motions of no operation, point-to-point and rapid motions, those under FORCE OFF, at the
     operation's ``rapid`` and above, those that come from axis positions (approaches, with no known direction), and
     those along the spindle axis (of plunges the model knows nothing).  Refusal: of the file; FRC011
-    where no operation has any motion; FRC013 where a feed is not known.
+    where no operation has any motion; FRC013 where a feed is not known; FRC033 under M4.
     """
     operations = read_process(path)
     joined = join(operations, toolpath)
@@ -53,6 +53,10 @@ def process_forces(
         )
         findings.append(Finding("FRC014", what, program, int(toolpath.line[np.argmax(free)])))
     cutting &= ~free
+    back = np.flatnonzero(cutting & (toolpath.spindle < 0))
+    if len(back):
+        message = f"the program turns the spindle counter-clockwise in {len(back)} motions that cut"
+        raise Refusal(Finding("FRC033", message, program, int(toolpath.line[back[0]])))
     _check_feed(operations, joined, cutting, toolpath, path, program)
     findings += _passed_over(operations, joined, cutting, toolpath, program)
 

@@ -14,7 +14,7 @@ from postproc.base.units import MM
 from postproc.compensation.uncertainty import Uncertainty
 from postproc.part.part_figures import ErrorFigures, PartError, PartFigures
 from postproc.report.part_mesh import BANDS, band_colours
-from postproc.report.part_report import SIDES, posted_sentence, side_sentence
+from postproc.report.part_report import SIDES, forces_sentence, side_sentence
 
 WIDE, HIGH = 640, 400
 """Pixels of a static picture."""
@@ -43,7 +43,7 @@ def part_section(part: PartError, uncertainty: Uncertainty, yaw: float) -> dict[
         for name, side in figures.sides
     ]
     return {
-        "sentence": " ".join([*sentences, f"As posted: {posted_sentence(figures.as_posted)}."]),
+        "sentence": " ".join([*sentences, f"Forces: {forces_sentence(figures)}."]),
         "images": pictures,
         "wide": WIDE,
         "high": HIGH,

@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.base.units import MM
 from postproc.compensation.uncertainty import Uncertainty
-from postproc.part.part_figures import AsPosted, ErrorFigures, PartFigures, SideFigures, SurfaceGroup
+from postproc.part.part_figures import CutForces, ErrorFigures, PartFigures, SideFigures, SurfaceGroup
 from postproc.report.formatting import two_digits
 
 SIDES = {"before": "part before", "after": "part after"}
@@ -25,18 +25,19 @@ def part_json(part: PartFigures) -> dict[str, object]:
         "after": None if part.after is None else _side(part.after),
         "features": _groups(part.features),
         "operations": _groups(part.operations),
-        "as_posted": _as_posted(part.as_posted),
+        "as_posted": _forces(part.as_posted),
+        "as_compensated": None if part.as_compensated is None else _forces(part.as_compensated),
     }
 
 
-def _as_posted(posted: AsPosted) -> dict[str, object]:
-    force = posted.force
+def _forces(side: CutForces) -> dict[str, object]:
+    force = side.force
     return {
         "engagement": "nominal" if force is None else "coupled",
-        "reason": posted.nominal or None,
+        "reason": side.nominal or None,
         "force_max_n": None if force is None else round(force, 6),
-        "nominal_force_max_n": round(posted.force_nominal, 6),
-        "residual": None if posted.residual is None else _mm(posted.residual),
+        "nominal_force_max_n": round(side.force_nominal, 6),
+        "residual": None if side.residual is None else _mm(side.residual),
     }
 
 
@@ -83,22 +84,24 @@ def _groups(groups: Sequence[SurfaceGroup]) -> list[dict[str, object]]:
 
 def part_rows(part: PartFigures | None, uncertainty: Uncertainty) -> Iterator[tuple[str, str]]:
     """A line a side: largest gouge and excess, their interval, rms, what is out of tolerance, and the worst place; and
-    one of the forces as posted."""
+    one of the forces."""
     if part is None:
         return
     for name, side in part.sides:
         yield SIDES[name], side_sentence(side, part.tolerance, uncertainty)
-    yield "as posted", posted_sentence(part.as_posted)
+    yield "part forces", forces_sentence(part)
 
 
-def posted_sentence(posted: AsPosted) -> str:
-    """With which forces the part as posted is predicted."""
-    if posted.force is None:
-        return f"forces of the nominal engagement, because {posted.nominal}"
-    return (
-        f"engagement and deflection solved together: forces up to {posted.force:.0f} N, of the nominal engagement,"
-        f" which the correction restores, up to {posted.force_nominal:.0f} N"
-    )
+def forces_sentence(part: PartFigures) -> str:
+    """With which forces the errors of the part are predicted."""
+    sides = (("as posted", part.as_posted), ("as compensated", part.as_compensated))
+    words = []
+    for name, forces in sides:
+        if forces is not None and forces.force is None:
+            words.append(f"{name} those of the nominal engagement, because {forces.nominal}")
+        elif forces is not None:
+            words.append(f"{name} up to {forces.force:.0f} N, engagement and deflection solved together")
+    return f"{'; '.join(words)}; of the nominal engagement up to {part.as_posted.force_nominal:.0f} N"
 
 
 def side_sentence(side: SideFigures, tolerance: float, uncertainty: Uncertainty) -> str:

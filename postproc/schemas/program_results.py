@@ -140,6 +140,20 @@ _PART_GROUPS = record(
     },
     "a part of the surface",
 )
+_CUT_FORCES = {
+    "engagement": word(
+        "coupled: solved together with the deflection; nominal: that of tools that do not yield",
+        ("coupled", "nominal"),
+    ),
+    "reason": word("why it is the nominal one", nullable=True),
+    "force_max_n": quantity("N", "largest force of this side", nullable=True),
+    "nominal_force_max_n": quantity("N", "largest force of the nominal engagement"),
+    "residual": quantity(
+        "mm",
+        "largest difference between the deflection by a force and that it acts at",
+        nullable=True,
+    ),
+}
 _PART_ERROR = record(
     {
         "points": integer("points of the surface that the program makes"),
@@ -150,25 +164,8 @@ _PART_ERROR = record(
         "after": record(_PART_SIDE, "as compensated", nullable=True),
         "features": array(_PART_GROUPS, "by the angle of the surface to the spindle"),
         "operations": array(_PART_GROUPS, "by tool, in the order of the program"),
-        "as_posted": record(
-            {
-                "engagement": word(
-                    "coupled: solved together with the deflection; nominal: that of tools that do not yield",
-                    ("coupled", "nominal"),
-                ),
-                "reason": word("why it is the nominal one", nullable=True),
-                "force_max_n": quantity("N", "largest force as posted", nullable=True),
-                "nominal_force_max_n": quantity(
-                    "N", "largest force of the nominal engagement, as compensated"
-                ),
-                "residual": quantity(
-                    "mm",
-                    "largest difference between the deflection by a force and that it acts at",
-                    nullable=True,
-                ),
-            },
-            "the forces as posted",
-        ),
+        "as_posted": record(_CUT_FORCES, "the forces as posted"),
+        "as_compensated": record(_CUT_FORCES, "the forces as compensated", nullable=True),
     },
     "signed normal error of the surface of the part; null where the process states no stock",
     nullable=True,

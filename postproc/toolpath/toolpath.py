@@ -77,7 +77,8 @@ class Toolpath(MotionColumns):
     ``external`` (N, 6) [mm or deg, as in the text]: external axes E1..E6 at the end of each motion; NaN where nothing
     has stated them yet, ``COMPUTED`` or ``LOST`` where they are not known.
     ``feed`` (N,) [m/s]: NaN where it is not known.
-    ``spindle`` (N,) [rad/s]: the speed of the spindle, as the program states it; NaN where it does not, or varies.
+    ``spindle`` (N,) [rad/s]: the speed of the spindle, as the program states it: below zero where it turns
+    counter-clockwise (-inf at a speed that is not known), 0 where it stands; NaN where nothing is stated, or it varies.
     ``inverse_time_feed`` (N,): the text gives the time that the motion takes, its feed follows from its length (G93).
     ``base``, ``tool`` (N,): index into ``frames``, -1 where it is not known.
     ``line`` (N,): from 1.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from postproc.base.findings import Finding
+from postproc.base.units import MM
 from postproc.compensation.subdivision import Subdivision
 from postproc.part.part_figures import PartError
 from postproc.workflows.force_log import logged_force_findings
@@ -29,4 +30,19 @@ def part_error_of(
     if isinstance(part, Finding):
         return None, (part,)
     stated = StatedIntervals(ready.cell.force_ci95, ready.cell.force_vector)
-    return with_uncertainty(part, task, run, division, stated), ()
+    return with_uncertainty(part, task, run, division, stated), _beyond_tolerance(part, task.file)
+
+
+def _beyond_tolerance(part: PartError, file: str) -> tuple[Finding, ...]:
+    after, tolerance = part.figures.after, part.figures.tolerance
+    if after is None or abs(after.worst.error) <= tolerance:
+        return ()
+    worst = after.worst
+    kind = "an excess" if worst.error > 0 else "a gouge"
+    place = ", ".join(f"{value / MM:.1f}" for value in worst.position)
+    message = (
+        f"as compensated {100 * after.whole.out:.1f} % of the surface of the part exceeds the tolerance"
+        f" {tolerance / MM:g} mm; the worst is {kind} of {abs(worst.error) / MM:.3f} mm at {place} (mm, axes of the"
+        " stock)"
+    )
+    return (Finding("PRT002", message, file, worst.line),)

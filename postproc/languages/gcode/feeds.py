@@ -64,8 +64,9 @@ class Feeds:
         return np.asarray(result / 60.0)
 
     def speeds(self, blocks: Ints) -> Floats:
-        """(N,) [rad/s] of the spindle in blocks of the program (N,): the S that is in force; NaN where none is, at a
-        constant surface speed, after M5, and where an S may be the limit of a block that shifts the origin (G92 S)."""
+        """(N,) [rad/s] of the spindle in blocks of the program (N,): the S that is in force, below zero after M4, 0
+        after M5; NaN, after M4 -inf, where no S is, at a constant surface speed, and where an S may be the limit of a
+        block that shifts the origin (G92 S)."""
         column, keep = self._spindle, ~self._given.modal.has(Once.SHIFT)[self._spindle.block]
         stated = WordColumn(column.block[keep], column.value[keep], column.how[keep])
         _, turns = _latest(stated, blocks)
@@ -73,8 +74,10 @@ class Feeds:
         codes = self._given.words(key("M"))
         switches = np.isin(codes.value, (3.0, 4.0, 5.0))
         at = np.searchsorted(codes.block[switches], blocks, side="right") - 1
-        stands = (at >= 0) & (np.append(codes.value[switches], 0.0)[at] == 5.0)
-        return np.where((turns > 0) & ~stands, turns * (2 * np.pi / 60.0), np.nan)
+        switch = np.where(at >= 0, np.append(codes.value[switches], 0.0)[at], 0.0)
+        back = switch == 4.0
+        size = np.where(turns > 0, turns * (2 * np.pi / 60.0), np.where(back, np.inf, np.nan))
+        return np.where(switch == 5.0, 0.0, np.where(back, -size, size))
 
 
 def _latest(column: WordColumn, blocks: Ints) -> tuple[Ints, Floats]:

@@ -144,7 +144,7 @@ def _mark_solid(blank: Blank, solid: Ints) -> None:
 
 @compiled
 def _inside(blank: Blank, x: float, y: float, z: float) -> bool:
-    """Whether a ray upward leaves the mesh an odd number of times.
+    """Whether a ray upward leaves bodies of the mesh more or less often than it enters: bodies may overlap.
 
     An edge that two triangles share is seen by both as from the same end, so a ray meets exactly one of them.
     """
@@ -152,7 +152,7 @@ def _inside(blank: Blank, x: float, y: float, z: float) -> bool:
     i = min(max(int((x - frame[_LOW]) / frame[_SIZE]), 0), int(frame[_SHAPE]) - 1)
     j = min(max(int((y - frame[_LOW + 1]) / frame[_SIZE]), 0), int(frame[_SHAPE + 1]) - 1)
     column = int(frame[_COLUMNS]) + i * int(frame[_SHAPE + 1]) + j
-    odd = False
+    winds = 0
     for place in range(blank.lists[column], blank.lists[column + 1]):
         f = blank.lists[place]
         over = False
@@ -169,8 +169,8 @@ def _inside(blank: Blank, x: float, y: float, z: float) -> bool:
             vx, vy, vz = t[f, 6] - t[f, 0], t[f, 7] - t[f, 1], t[f, 8] - t[f, 2]
             nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
             if nz != 0.0 and t[f, 2] - (nx * (x - t[f, 0]) + ny * (y - t[f, 1])) / nz > z:
-                odd = not odd
-    return odd
+                winds += 1 if nz > 0.0 else -1
+    return winds != 0
 
 
 @compiled

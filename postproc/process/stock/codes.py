@@ -174,5 +174,29 @@ CODES = define(
             action="Correct `spindle` in the process file, or leave it out to use the S of the program.",
             example="`spindle: 12000` for a program with `S10000 M3`.",
         ),
+        "STK022": Code(
+            "warning",
+            "spindle turns counter-clockwise",
+            meaning="The program cuts after M4.",
+            consequence="The forces are those of a left-hand cutting tool: another one would not cut.",
+            action="Check M3 and M4, and the helix: that of a left-hand tool that pulls is negative.",
+            example="`S12000 M4` before a cut.",
+        ),
+        "STK023": Code(
+            "warning",
+            "spindle stands in a cut",
+            meaning="The program cuts after M5.",
+            consequence="A tool that does not turn breaks; the forces are those of one that does, where known.",
+            action="Check M3 and M5.",
+            example="`M5` before the last pass.",
+        ),
+        "STK024": Code(
+            "warning",
+            "feed per tooth is implausible",
+            meaning="The feed per tooth is below 0.0005 mm, or above a fifth of the diameter.",
+            consequence="Feed or speed have probably another unit than stated, and the forces are as wrong.",
+            action="Compare F, its unit (G94, G95, mm, inches), S and the number of teeth with the machine.",
+            example="`F3.6`, meant in m/min, at 12000 1/min: 0.0001 mm per tooth.",
+        ),
     }
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,6 +42,9 @@ FINER, UNEVEN = 6, 0.05
 
 ALIKE = 0.02
 """Short motions are interpolated between places whose removed areas differ by at most this share."""
+
+_STEP, _HALVINGS = 0.2, 8
+"""Of two places of such a sweep one removes less than this share of the other: where it steps is halved so often."""
 
 LEAST_AREA = 1e-5 * MM**2
 """Across the feed: below it nothing is cut."""
@@ -104,35 +108,36 @@ def engage(
     radius = np.array([cutter.radius for cutter in sweeps.cutters])[sweeps.rows[:, CUTTER].astype(int)]
     active = live[earlier:, 0] <= live[earlier:, 1]
 
-    def look_at(chosen: Ints, finer: int) -> tuple[Ints, Floats, Floats]:
-        """The sweep of each place, the length of path that it represents, and its contact."""
-        sweep, share, weight = _places(sweeps, radius, chosen, finer)
+    def look(sweep: Ints, share: Floats) -> Floats:
+        """Contacts (K, COLUMNS) at shares (K,) of sweeps (K,)."""
         found = np.zeros((len(sweep), COLUMNS))
 
-        def look(part: slice) -> None:
+        def each(part: slice) -> None:
             contacts(stock, profiles, padded, live, heading, earlier + sweep[part], share[part], found[part])
 
-        each_block(look, len(sweep), _BLOCK)
-        return sweep, weight, found
+        each_block(each, len(sweep), _BLOCK)
+        return found
+
+    def look_at(chosen: Ints) -> tuple[Ints, Floats, Floats]:
+        """The sweep of each place, the length of path that it represents, and its contact."""
+        sweep, share, weight = _places(sweeps, radius, chosen)
+        return sweep, weight, look(sweep, share)
+
+    def middles(some: Ints) -> Floats:
+        return look_at(some)[2]
 
     chosen = np.flatnonzero(active & (sweeps.rows[:, REMOVES] > 0))
     short = sweeps.length[chosen] <= SPACING * radius[chosen]
-    sweep, weight, found = look_at(chosen[~short], 1)
+    long = look_at(chosen[~short])
     short_sweeps = chosen[short]
-    seen = chain_contacts(
-        sweeps, laws, short_sweeps, SPACING * radius, ALIKE, lambda some: look_at(some, 1)[2]
-    )
-    parts = ((sweep, short_sweeps), (weight, sweeps.length[short_sweeps]), (found, seen))
-    sweep, weight, found = (np.concatenate(pair) for pair in parts)
-    order = np.argsort(sweep, kind="stable")
-    sweep, weight, found = sweep[order], weight[order], found[order]
-    uneven = _uneven(sweep, found[:, RATE])
+    seen = chain_contacts(sweeps, laws, short_sweeps, SPACING * radius, ALIKE, middles)
+    pairs = zip(long, (short_sweeps, sweeps.length[short_sweeps], seen), strict=True)
+    sweep, weight, found = _in_order(*(np.concatenate(pair) for pair in pairs))
+    uneven = np.union1d(_uneven(sweep, found[:, RATE]), _missed(sweep, found[:, RATE], look))
     again = np.isin(sweep, uneven)
-    finer = look_at(uneven, FINER)
+    finer = _look_closer(sweeps, radius, uneven, look)
     pairs = zip((sweep[~again], weight[~again], found[~again]), finer, strict=True)
-    sweep, weight, found = (np.concatenate(pair) for pair in pairs)
-    order = np.argsort(sweep, kind="stable")
-    sweep, weight, found = sweep[order], weight[order], found[order]
+    sweep, weight, found = _in_order(*(np.concatenate(pair) for pair in pairs))
     hits = _hits(stock, sweeps, profiles, heading, live, earlier, radius)
     speed = speeds_of(sweeps, toolpath, edges)
     cut = _by_motion(len(toolpath), sweeps, sweep, weight, found, laws, speed, hits, stock)
@@ -158,17 +163,24 @@ def laws_of(sweeps: MotionSweeps, toolpath: Toolpath, edges: dict[int, Edges]) -
         own = edges[cutter.number]
         if not cutter.teeth or cutter.helix is None or own.material is None:
             continue
-        laws[of, 0] = toolpath.feed[sweeps.motion[of]] * (2 * np.pi / (speed[of] * cutter.teeth))
+        laws[of, 0] = toolpath.feed[sweeps.motion[of]] * (2 * np.pi / (np.abs(speed[of]) * cutter.teeth))
         known = own.material.coefficients
         laws[of, 1:] = [cutter.teeth, np.sign(cutter.helix), *known.cutting, *known.edge]
+        # the other way round a left-hand helix pulls, and the tangential force is turned
+        back = of[speed[of] < 0]
+        for column in (2, 3, 6):
+            laws[back, column] *= -1.0
     laws[~(laws[:, 0] > 0), 0] = np.nan
     return laws
 
 
 def speeds_of(sweeps: MotionSweeps, toolpath: Toolpath, edges: dict[int, Edges]) -> Floats:
-    """(M,) [rad/s] the speed of the spindle: that of the process file, where it states none that of the program."""
+    """(M,) [rad/s] the speed of the spindle: that of the process file, where it states none that of the program; below
+    zero where the program turns it counter-clockwise."""
     stated = np.array([edges[cutter.number].speed or np.nan for cutter in sweeps.cutters])[sweeps.which]
-    return np.where(np.isnan(stated), toolpath.spindle[sweeps.motion], stated)
+    program = toolpath.spindle[sweeps.motion]
+    known = np.where(np.isfinite(program) & (program != 0), np.abs(program), np.nan)
+    return np.where(program < 0, -1.0, 1.0) * np.where(np.isnan(stated), known, stated)
 
 
 def _uneven(sweep: Ints, rate: Floats) -> Ints:
@@ -178,6 +190,60 @@ def _uneven(sweep: Ints, rate: Floats) -> Ints:
     first = np.flatnonzero(np.append(True, sweep[1:] != sweep[:-1]))
     most, least = np.maximum.reduceat(rate, first), np.minimum.reduceat(rate, first)
     return sweep[first][most - least > UNEVEN * most]
+
+
+def _in_order(sweep: Ints, weight: Floats, found: Floats) -> tuple[Ints, Floats, Floats]:
+    order = np.argsort(sweep, kind="stable")
+    return sweep[order], weight[order], found[order]
+
+
+def _missed(sweep: Ints, rate: Floats, look: Callable[[Ints, Floats], Floats]) -> Ints:
+    """The sweeps with an end that cuts, or does not, unlike the place (K,) next to it: a plunge that just reaches
+    stock, or one that starts just above.  Where a sweep that cuts goes on in one that does, its end is not looked
+    at."""
+    if not len(sweep):
+        return sweep
+    cuts, change = rate > LEAST_AREA, sweep[1:] != sweep[:-1]
+    joins = cuts[1:] & cuts[:-1] & (np.diff(sweep) == 1)
+    first, last = np.append(True, change & ~joins), np.append(change & ~joins, True)
+    found = []
+    for end, side in ((0.0, first), (1.0, last)):
+        some, near = sweep[side], rate[side]
+        there = look(some, np.full(len(some), end))[:, RATE]
+        least, most = np.minimum(near, there), np.maximum(near, there)
+        found.append(some[(least < _STEP * most) & (most > LEAST_AREA)])
+    return np.union1d(*found)
+
+
+def _look_closer(
+    sweeps: MotionSweeps, radius: Floats, uneven: Ints, look: Callable[[Ints, Floats], Floats]
+) -> tuple[Ints, Floats, Floats]:
+    """As ``look_at`` in ``engage``, FINER times closer and at both ends.
+
+    Where the removed area steps between two places, as a face is met at once, the lengths that they represent meet at
+    the step.
+    """
+    sweep, share, weight = _places(sweeps, radius, uneven, FINER)
+    nothing = np.zeros(len(uneven))
+    sweep = np.concatenate([sweep, uneven, uneven])
+    share = np.concatenate([share, nothing, nothing + 1])
+    order = np.lexsort((share, sweep))
+    sweep, share, weight = sweep[order], share[order], np.concatenate([weight, nothing, nothing])[order]
+    found = look(sweep, share)
+    rate = found[:, RATE]
+    least, most = np.minimum(rate[1:], rate[:-1]), np.maximum(rate[1:], rate[:-1])
+    at = np.flatnonzero((sweep[1:] == sweep[:-1]) & (least < _STEP * most) & (most > LEAST_AREA))
+    low, high, falls = share[at], share[at + 1], rate[at] > rate[at + 1]
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        cuts = look(sweep[at], middle)[:, RATE] > 0.5 * most[at]
+        low, high = np.where(cuts == falls, middle, low), np.where(cuts == falls, high, middle)
+    total = np.cumsum(weight)
+    before = np.concatenate([[0.0], total])[np.searchsorted(sweep, sweep[at])]
+    shift = 0.5 * (low + high) * sweeps.length[sweep[at]] - (total[at] - before)
+    np.add.at(weight, at, shift)
+    np.subtract.at(weight, at + 1, shift)
+    return sweep, weight, found
 
 
 def _places(

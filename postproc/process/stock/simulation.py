@@ -16,7 +16,7 @@ from postproc.process.stated_forces import BASE, FEED, StatedForces
 from postproc.process.stock.blank import Blank, box_blank, corners_of, cylinder_blank, mesh_blank
 from postproc.process.stock.cutters import CUTTING, HOLDER, SHANK
 from postproc.process.stock.distance import AXIS, CUTTER, REMOVES, STEP, TIP_POINT, TURN
-from postproc.process.stock.engagement import EngagedMotions, engage
+from postproc.process.stock.engagement import EngagedMotions, engage, laws_of
 from postproc.process.stock.motion_sweeps import MotionSweeps, find_sweeps
 from postproc.process.stock.saved_stock import Removed, read_stock, stock_bytes
 from postproc.process.stock.stl import read_stl
@@ -28,6 +28,8 @@ _PARTS = {CUTTING: "the cutter", SHANK: "the shank", HOLDER: "the holder"}
 _MOST_FINDINGS = 20
 _NO_MOVE = 1e-7  # m
 _SAME_SPEED = 0.001
+_LEAST_CHIP, _LARGEST_CHIP = 0.0005 * MM, 0.2
+"""[m] and of the diameter: feeds per tooth beyond have another unit than it seems."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +77,9 @@ def simulate(path: Path, toolpath: Toolpath, frames: MotionFrames, program: str)
         *_not_simulated(sweeps, toolpath, program),
         *_lengths(sweeps, process),
         *_commented(sweeps, commented, program),
+        *_implausible_chips(
+            sweeps, laws_of(sweeps, toolpath, edges)[:, 0], engagement.cuts, toolpath, program
+        ),
         *_speeds(sweeps, engagement.cuts, process, toolpath, program),
     ]
     return StockRun(process, toolpath, blank, before, sweeps, engagement, ci95, tuple(findings))
@@ -168,7 +173,7 @@ def unknown_forces(run: StockRun, toolpath: Toolpath, program: str, code: str) -
         if not len(rows):
             continue
         own = run.process.edges[cutter.number]
-        turns = own.speed is not None or not np.isnan(toolpath.spindle[rows]).any()
+        turns = own.speed is not None or _turns(toolpath.spindle[rows]).all()
         stated = {
             "teeth": cutter.teeth,
             "helix": cutter.helix,
@@ -182,6 +187,11 @@ def unknown_forces(run: StockRun, toolpath: Toolpath, program: str, code: str) -
         where = (program, int(toolpath.line[rows[0]])) if of_program else (str(run.process.path), cutter.line)
         findings.append(Finding(code, message, *where))
     return findings
+
+
+def _turns(speed: Floats) -> Bools:
+    """(K,) speeds of a program that are known and not zero."""
+    return np.asarray(np.isfinite(speed) & (speed != 0))
 
 
 def _summaries(run: StockRun, toolpath: Toolpath, path: Path) -> list[Finding]:
@@ -269,6 +279,25 @@ def _commented(sweeps: MotionSweeps, commented: Mapping[int, CommentedTool], pro
     return findings
 
 
+def _implausible_chips(
+    sweeps: MotionSweeps, chip: Floats, cuts: Bools, toolpath: Toolpath, program: str
+) -> list[Finding]:
+    """One finding for each tool; chip (M,) [m]: feed per tooth of the sweeps."""
+    findings = []
+    for index, cutter in enumerate(sweeps.cutters):
+        own = (sweeps.which == index) & cuts[sweeps.motion]
+        wrong = own & ((chip < _LEAST_CHIP) | (chip > _LARGEST_CHIP * 2 * cutter.radius))
+        if not wrong.any():
+            continue
+        at = int(np.argmax(wrong))
+        message = (
+            f"tool {cutter.number} has a feed per tooth of {chip[at] / MM:.3g} mm here, and in"
+            f" {len(np.unique(sweeps.motion[wrong]))} motions that cut an implausible one"
+        )
+        findings.append(Finding("STK024", message, program, int(toolpath.line[sweeps.motion[at]])))
+    return findings
+
+
 def _speeds(
     sweeps: MotionSweeps, cuts: Bools, process: StockProcess, toolpath: Toolpath, program: str
 ) -> list[Finding]:
@@ -276,13 +305,26 @@ def _speeds(
     findings = []
     for index, cutter in enumerate(sweeps.cutters):
         rows = np.unique(sweeps.motion[sweeps.which == index])
-        rows = rows[cuts[rows] & ~np.isnan(toolpath.spindle[rows])]
+        rows = rows[cuts[rows]]
+        back, stands = rows[toolpath.spindle[rows] < 0], rows[toolpath.spindle[rows] == 0]
+        if len(back):
+            message = (
+                f"the program turns the spindle counter-clockwise in {len(back)} motions that cut: tool"
+                f" {cutter.number} is taken for one that cuts so"
+            )
+            findings.append(Finding("STK022", message, program, int(toolpath.line[back[0]])))
+        if len(stands):
+            message = (
+                f"tool {cutter.number} cuts in {len(stands)} motions after the program stops the spindle"
+            )
+            findings.append(Finding("STK023", message, program, int(toolpath.line[stands[0]])))
+        rows = rows[_turns(toolpath.spindle[rows])]
         stated = process.edges[cutter.number].speed
         if stated is not None:
-            rows = rows[np.abs(toolpath.spindle[rows] - stated) > _SAME_SPEED * stated]
+            rows = rows[np.abs(np.abs(toolpath.spindle[rows]) - stated) > _SAME_SPEED * stated]
         if not len(rows):
             continue
-        turns = np.unique(np.round(toolpath.spindle[rows] * 30 / np.pi, 3))
+        turns = np.unique(np.round(np.abs(toolpath.spindle[rows]) * 30 / np.pi, 3))
         words = f"{turns[0]:g}" if len(turns) == 1 else f"{turns[0]:g} to {turns[-1]:g}"
         line = int(toolpath.line[rows[0]])
         if stated is None:
