@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from measured import MARKERS, on_markers, plan, scattered, somewhere, taken
 from rich.console import Console
-from scipy.stats import chi2
+from scipy.stats import f
 
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses
@@ -286,7 +286,8 @@ def test_gains_of_all_candidates(spring, stale):
     assert gains.alone[group] > gains.needed[group]
     np.testing.assert_array_equal(stale.gains.alone, stale.gains.beside)
     single = [len(candidate.unknowns) == 1 for candidate in stale.diagnosis.search.linear.candidates]
-    np.testing.assert_allclose(stale.gains.needed[single], chi2.isf(CHANCE / len(single), 1))
+    poses = stale.diagnosis.search.base.campaign.poses
+    np.testing.assert_allclose(stale.gains.needed[single], f.isf(CHANCE / len(single), 1, poses - 1))
 
 
 def search_gain(result) -> float:

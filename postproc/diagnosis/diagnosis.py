@@ -15,7 +15,16 @@ from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patte
 from postproc.diagnosis.sample import sample_of
 from postproc.diagnosis.search import model_unknowns, search
 from postproc.diagnosis.search_result import Search
-from postproc.diagnosis.verdict import OTHER_COURSE, SIZE_UNDETERMINED, Verdict, judge, refitted
+from postproc.diagnosis.unmoved_geometry import restore_unmoved_geometry
+from postproc.diagnosis.verdict import (
+    ONLY_TOGETHER,
+    OTHER_COURSE,
+    SIZE_UNDETERMINED,
+    Verdict,
+    judge,
+    refitted,
+    with_estimates,
+)
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
 from postproc.model import StiffnessModel
@@ -105,11 +114,24 @@ def diagnose(
             final = base
         elif differ:
             final = without_effects(campaign, final, differ)
+            if _squares(final) > _squares(base):
+                # what is left of an explanation without its other half makes the readings worse
+                rejected += [(one.candidate, ONLY_TOGETHER) for one in verdict.named]
+                verdict = replace(verdict, word="unknown", named=(), alternatives=())
+                final, disagreement, agreed = base, (), False
+    final = restore_unmoved_geometry(final)
+    verdict = with_estimates(verdict, final, result)
     # where an effect is missing in a model its own parameters compensate for that
     moved = refitted(final) if verdict.word not in ("ambiguous", "unknown") else ()
     verdict = replace(verdict, rejected=tuple(rejected), refitted=moved)
     where = residual_patterns(stated, result.confirmed)
     return Diagnosis(stated, where, result, verdict, final, base, disagreement, agreed)
+
+
+def _squares(fitted: Fit) -> float:
+    """The squares that remain after a fit, in stated variances."""
+    residual = fitted.plain_weights(np.nan_to_num(fitted.point.residual))
+    return float(residual @ residual)
 
 
 def _fitted_to(campaign: Campaign, fitted: Fit) -> Fit:
