@@ -27,6 +27,7 @@ from postproc.diagnosis.verdict import (
 )
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
+from postproc.identification.noise import Weighting
 from postproc.model import StiffnessModel
 
 FEWEST_POSES = 8
@@ -41,7 +42,8 @@ class Diagnosis:
     """stated: the robot file as it is, tracker and targets found; where: patterns in its residuals; search, verdict;
     final: the final model, of what is named, or of its own parameters refitted (``base``); disagreement [m]: the
     largest over the workspace of what explanations predict that cannot be distinguished, one of each set; ``agreed``:
-    it is so small that the correction is the same."""
+    it is so small that the correction is the same; clear_is_better: what is named without being ambiguous fits better
+    by itself than the robot file does."""
 
     stated: Fit
     where: tuple[ResidualPattern, ...]
@@ -51,6 +53,7 @@ class Diagnosis:
     base: Fit
     disagreement: tuple[float, ...] = ()
     agreed: bool = False
+    clear_is_better: bool = True
 
 
 def diagnose(
@@ -96,7 +99,7 @@ def diagnose(
     ]
     final = _of_names(base, result.confirmed, result, names)
     disagreement: tuple[float, ...] = ()
-    agreed = False
+    agreed, clear_is_better = False, True
     if verdict.alternatives:
         stage("comparing the explanations over the workspace")
         searched = _of_names(result.base, result.final, result, names)
@@ -113,9 +116,11 @@ def diagnose(
         if len(differ) == len(names):
             final = base
         elif differ:
-            final = without_effects(campaign, final, differ)
-            if _squares(final) > _squares(base):
-                # what is left of an explanation without its other half makes the readings worse
+            clear, bare = (without_effects(campaign, final, gone) for gone in (differ, names))
+            left = [_squares(one, stated.plain_weights) for one in (clear, bare, stated)]
+            final, clear_is_better = clear, left[0] < left[2]
+            if left[0] > left[1]:
+                # half of an explanation, which makes the readings worse by itself
                 rejected += [(one.candidate, ONLY_TOGETHER) for one in verdict.named]
                 verdict = replace(verdict, word="unknown", named=(), alternatives=())
                 final, disagreement, agreed = base, (), False
@@ -125,12 +130,12 @@ def diagnose(
     moved = refitted(final) if verdict.word not in ("ambiguous", "unknown") else ()
     verdict = replace(verdict, rejected=tuple(rejected), refitted=moved)
     where = residual_patterns(stated, result.confirmed)
-    return Diagnosis(stated, where, result, verdict, final, base, disagreement, agreed)
+    return Diagnosis(stated, where, result, verdict, final, base, disagreement, agreed, clear_is_better)
 
 
-def _squares(fitted: Fit) -> float:
-    """The squares that remain after a fit, in stated variances."""
-    residual = fitted.plain_weights(np.nan_to_num(fitted.point.residual))
+def _squares(fitted: Fit, weights: Weighting) -> float:
+    """The squares that remain after a fit."""
+    residual = weights(np.nan_to_num(fitted.point.residual))
     return float(residual @ residual)
 
 

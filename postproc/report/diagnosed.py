@@ -145,7 +145,7 @@ class Diagnosed(Result):
         """Whether a new robot file would be better than the old one."""
         word = self.verdict.word
         if word == "ambiguous":
-            return self.diagnosis.agreed or bool(self.clear)
+            return self.diagnosis.agreed or (bool(self.clear) and self.diagnosis.clear_is_better)
         if word == "nothing_missing":
             return bool(self.verdict.refitted) or self._is_refitted
         return word in ("named", "partly_named")

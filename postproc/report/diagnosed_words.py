@@ -134,10 +134,12 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
         return
     measured = bool(result.diagnosis.disagreement)
     differ = f" by up to {_mm(largest)} mm" if measured and np.isfinite(largest) else ""
+    gets = "gets only what is clear" if result.improves else "is not changed"
+    if result.clear and not result.improves:
+        gets += ": what is clear would fit worse by itself"
     yield (
         f"Elsewhere in the workspace, or under other loads, their corrections differ{differ}, so the robot file"
-        f" {'gets only what is clear' if result.clear else 'is not changed'}. With all effects found the residual would"
-        f" be {_mm(result.rms['explained'])} mm."
+        f" {gets}. With all effects found the residual would be {_mm(result.rms['explained'])} mm."
     )
     yield from _more(result, "More is missing:", "explained")
     planned = result.next_poses
