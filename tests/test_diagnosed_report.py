@@ -647,6 +647,12 @@ def test_what_is_said_of_the_unknown(spring, stale):
     assert paragraph(unclear).startswith("It is not clear whether an effect is missing.")
     assert "is not named: its parameters would have to lie at their bounds" in paragraph(unclear)
     assert headline(unclear) == "unknown: not clear whether an effect is missing"
+    alone = judged(spring, "unknown", final=spring.diagnosis.base, named=(), rejected=rejected)
+    assert headline(alone) == "unknown: an effect is missing, and it is not clear which"
+    assert paragraph(alone).startswith(
+        f"An effect is missing: the residual is {millimetres(alone.rms['after'])} RMS where readings scatter by"
+    )
+    assert "Which one is not clear." in paragraph(alone)
     part = lacking(spring, "partly_named", named=spring.verdict.named)
     assert f"More is missing: the residual is {millimetres(part.rms['after'])} RMS" in paragraph(part)
 

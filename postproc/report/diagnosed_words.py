@@ -61,6 +61,8 @@ def headline(result: Diagnosed) -> str:
         "ambiguous": f"ambiguous: {sets}{_either_way(result)}{f'; named: {names}' if names else ''}",
         "unknown": "unknown: no effect that was tried explains the residual"
         if result.scatter_exceeded
+        else "unknown: an effect is missing, and it is not clear which"
+        if result.needs_effects
         else "unknown: not clear whether an effect is missing",
     }[verdict.word]
     return f"{words} (if the residual is scatter)" if verdict.conditional else words
@@ -178,7 +180,13 @@ def _limited(result: Diagnosed) -> str:
 def _unknown(result: Diagnosed) -> Iterator[str]:
     search = result.diagnosis.search
     if not result.scatter_exceeded:
-        yield "It is not clear whether an effect is missing."
+        if result.needs_effects:
+            yield (
+                f"An effect is missing: the residual is {_mm(result.rms['after'])} mm RMS{_against_scatter(result)}."
+                " Which one is not clear."
+            )
+        else:
+            yield "It is not clear whether an effect is missing."
     else:
         yield (
             f"An effect is missing: the residual is {_mm(result.rms['after'])} mm RMS{_against_scatter(result)}. It is"
