@@ -4,6 +4,7 @@ fitted along adds its scatter to every prediction."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,14 +18,20 @@ LEAST = 4.0
 """Variances of a reading that a parameter must at least explain; of many that are tried, 2 ln(how many): the risk
 inflation criterion (Foster and George, Ann. Stat. 22 (1994))."""
 
+TOGETHER = 0.05
+"""Probability that what is left out would explain as much by chance."""
+
 
 def restore_unmoved_geometry(fitted: Fit) -> Fit:
     """The fit with those geometric parameters alone that the readings ask for, the others as stated or at their null.
 
     Parameters are taken in one after the other, that first which explains most beside what is in already; then those
-    that the others make unnecessary leave again.  Unchanged where all are needed, where a joint that has parameters of
-    its own that nothing states would keep none, or where the fit without the others is clearly worse.
+    that the others make unnecessary leave again.  Intervals stay those of the fit of all: they hold what the others may
+    be.  Unchanged where all are needed, where a joint that has parameters of its own that nothing states would keep
+    none, or where the others together explain more than chance: an arm that is a little off everywhere.
     """
+    from scipy.special import chdtri
+
     places = [k for k, u in enumerate(fitted.unknowns) if _effect(u) in PLAUSIBLE and not u.fixed]
     if len(places) < 2:
         return fitted
@@ -39,8 +46,21 @@ def restore_unmoved_geometry(fitted: Fit) -> Fit:
     rest = [u for u in fitted.asked if u.key not in gone]
     model = fitted.model.with_values(gone)
     found = fit(fitted.campaign, model, rest, given=fitted.point.given, factor=fitted.factor)
-    worse = _squares(found, fitted) - _squares(fitted, fitted)
-    return fitted if worse > price * len(gone) else found
+    worse = (_squares(found, fitted) - _squares(fitted, fitted)) / max(fitted.factor, 1e-300)
+    if worse > chdtri(len(gone), TOGETHER):
+        return fitted
+    return replace(found, covariance=_covariance(found, fitted))
+
+
+def _covariance(found: Fit, fitted: Fit) -> Floats:
+    """(k, k) of what was ``found``, as of ``fitted``: that a parameter is not asked for does not make it exact, and
+    what it may be is in the intervals of the others."""
+    places = {u.key: k for k, u in enumerate(fitted.unknowns)}
+    here = [k for k, u in enumerate(found.unknowns) if u.key in places]
+    there = [places[found.unknowns[k].key] for k in here]
+    covariance = np.diag(np.diag(found.covariance))
+    covariance[np.ix_(here, here)] = fitted.covariance[np.ix_(there, there)]
+    return covariance
 
 
 def _effect(unknown: Unknown) -> str:
