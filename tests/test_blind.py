@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from blind import cases, command, gap, measured, table, verdicts, worker
+from blind import cases, command, gap, measured, real_command, table, verdicts, worker
 from blind.cases import Case, made
 from blind.hidden import EVERY, OUTSIDE
 from blind.oracle import Rival, joined
@@ -259,8 +259,10 @@ def test_tables_count_every_run(tmp_path):
 
 def test_what_was_run_is_not_run_again(tmp_path):
     path = tmp_path / "runs.jsonl"
-    path.write_text('{"key": "single/0/1", "x": 1}\n{"key": "other/0/1"}\n{"key": "single/1')
-    assert command.kept_records(path, {"single/0/1", "single/1/1"}) == [{"key": "single/0/1", "x": 1}]
+    path.write_text('{"key": "single/0/1", "x": 1}\n{"key": "other/0/2"}\n{"key": "single/1')
+    assert command.kept_records(path) == [{"key": "single/0/1", "x": 1}, {"key": "other/0/2"}]
+    path.write_text('{"row": "length", "number": 1, "seed": 2}\n{"row": "len')
+    assert real_command.kept(path) == [{"row": "length", "number": 1, "seed": 2}]
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from measured import MARKERS, on_markers, plan, scattered, somewhere, taken
 from rich.console import Console
-from scipy.stats import chi2
+from scipy.stats import f
 
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses
@@ -286,7 +286,8 @@ def test_gains_of_all_candidates(spring, stale):
     assert gains.alone[group] > gains.needed[group]
     np.testing.assert_array_equal(stale.gains.alone, stale.gains.beside)
     single = [len(candidate.unknowns) == 1 for candidate in stale.diagnosis.search.linear.candidates]
-    np.testing.assert_allclose(stale.gains.needed[single], chi2.isf(CHANCE / len(single), 1))
+    poses = stale.diagnosis.search.base.campaign.poses
+    np.testing.assert_allclose(stale.gains.needed[single], f.isf(CHANCE / len(single), 1, poses - 1))
 
 
 def search_gain(result) -> float:
@@ -646,6 +647,12 @@ def test_what_is_said_of_the_unknown(spring, stale):
     assert paragraph(unclear).startswith("It is not clear whether an effect is missing.")
     assert "is not named: its parameters would have to lie at their bounds" in paragraph(unclear)
     assert headline(unclear) == "unknown: not clear whether an effect is missing"
+    alone = judged(spring, "unknown", final=spring.diagnosis.base, named=(), rejected=rejected)
+    assert headline(alone) == "unknown: an effect is missing, and it is not clear which"
+    assert paragraph(alone).startswith(
+        f"An effect is missing: the residual is {millimetres(alone.rms['after'])} RMS where readings scatter by"
+    )
+    assert "Which one is not clear." in paragraph(alone)
     part = lacking(spring, "partly_named", named=spring.verdict.named)
     assert f"More is missing: the residual is {millimetres(part.rms['after'])} RMS" in paragraph(part)
 

@@ -2,7 +2,6 @@
 
 import pytest
 from blind import command, real_command
-from blind.real_worlds import TRIALS
 
 
 @pytest.fixture(scope="module")
@@ -11,7 +10,7 @@ def diagnosed():
     process = command.Diagnosing()
 
     def run(row, number, seed=1):
-        trial = TRIALS[row](number, seed)
+        trial = real_command.ALL[row](number, seed)
         return trial, *real_command.run(trial, process)
 
     yield run
@@ -142,3 +141,32 @@ def test_a_wave_of_another_order_is_no_harmonic(diagnosed):
 def test_rows_shifted_from_the_first_sixth_on(diagnosed):
     _, _, answer = diagnosed("lost", 1, seed=2)
     assert "IDN034" in {finding["code"] for finding in answer["findings"]}
+
+
+@pytest.mark.slow
+def test_a_small_sample_gives_no_further_names(diagnosed):
+    """23 poses: what looks like a wave of A1, or like the play of its gear, is chance."""
+    _, held, answer = diagnosed("stations", 0, seed=101)
+    assert answer["verdict"] == "named"
+    assert {name for name, _ in real_command.pairs(answer)} == {"link_geometry", "joint_offset"}
+    assert not held["a set without truth"]
+
+
+@pytest.mark.slow
+def test_half_of_an_explanation_that_makes_it_worse_is_no_name(diagnosed):
+    """A hose on an arm of five axes: waves of all gears explain it together with the geometry of all joints or other
+    waves, and without those make the readings worse than the file does."""
+    _, held, answer = diagnosed("unknown", 22, seed=3)
+    assert answer["verdict"] == "unknown"
+    assert any("fits only beside" in one["why"] for one in answer["rejected"])
+    assert not held["file written"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [2, 3, 4, 7, 10])
+def test_other_arms(diagnosed, number):
+    """Five axes, an arm on a rail, one of 235 kg, a cobot: judged by plain matrices."""
+    _, held, _ = diagnosed("arms", number, seed=3)
+    assert held["named or in the set"]
+    assert not held["a name that is wrong"]
+    assert held["gap closed"] > 0.8

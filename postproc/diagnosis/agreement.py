@@ -13,6 +13,7 @@ from postproc.diagnosis.candidates import Candidate
 from postproc.effects import Conditions
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit
+from postproc.identification.least_squares import descended
 from postproc.model import StiffnessModel
 
 STATES = 400
@@ -55,12 +56,13 @@ def largest_disagreement(
 
 
 def without_effects(campaign: Campaign, fitted: Fit, gone: Sequence[Candidate]) -> Fit:
-    """The fit with the effects ``gone`` at their null, everything else as it was estimated beside them."""
+    """The fit with the effects ``gone`` at their null, all other parameters as they were estimated beside them; tracker
+    and targets found anew."""
     keys: set[tuple[int, str]] = set()
     for candidate in gone:
         keys |= keys_of(fitted.model, candidate).keys()
     rest = [i for i, u in enumerate(fitted.unknowns) if u.key not in keys]
-    point = point_without(campaign, fitted, gone)
+    point = descended(campaign, point_without(campaign, fitted, gone), (), fitted.plain_weights)
     own, nuisance = fitted.point.taken
     return replace(
         fitted,

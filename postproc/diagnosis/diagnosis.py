@@ -15,9 +15,19 @@ from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patte
 from postproc.diagnosis.sample import sample_of
 from postproc.diagnosis.search import model_unknowns, search
 from postproc.diagnosis.search_result import Search
-from postproc.diagnosis.verdict import OTHER_COURSE, SIZE_UNDETERMINED, Verdict, judge, refitted
+from postproc.diagnosis.unmoved_geometry import restore_unmoved_geometry
+from postproc.diagnosis.verdict import (
+    ONLY_TOGETHER,
+    OTHER_COURSE,
+    SIZE_UNDETERMINED,
+    Verdict,
+    judge,
+    refitted,
+    with_estimates,
+)
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
+from postproc.identification.noise import Weighting
 from postproc.model import StiffnessModel
 
 FEWEST_POSES = 8
@@ -32,7 +42,8 @@ class Diagnosis:
     """stated: the robot file as it is, tracker and targets found; where: patterns in its residuals; search, verdict;
     final: the final model, of what is named, or of its own parameters refitted (``base``); disagreement [m]: the
     largest over the workspace of what explanations predict that cannot be distinguished, one of each set; ``agreed``:
-    it is so small that the correction is the same."""
+    it is so small that the correction is the same; clear_is_better: what is named without being ambiguous fits better
+    by itself than the robot file does."""
 
     stated: Fit
     where: tuple[ResidualPattern, ...]
@@ -42,6 +53,7 @@ class Diagnosis:
     base: Fit
     disagreement: tuple[float, ...] = ()
     agreed: bool = False
+    clear_is_better: bool = True
 
 
 def diagnose(
@@ -87,7 +99,7 @@ def diagnose(
     ]
     final = _of_names(base, result.confirmed, result, names)
     disagreement: tuple[float, ...] = ()
-    agreed = False
+    agreed, clear_is_better = False, True
     if verdict.alternatives:
         stage("comparing the explanations over the workspace")
         searched = _of_names(result.base, result.final, result, names)
@@ -104,12 +116,27 @@ def diagnose(
         if len(differ) == len(names):
             final = base
         elif differ:
-            final = without_effects(campaign, final, differ)
+            clear, bare = (without_effects(campaign, final, gone) for gone in (differ, names))
+            left = [_squares(one, stated.plain_weights) for one in (clear, bare, stated)]
+            final, clear_is_better = clear, left[0] < left[2]
+            if left[0] > left[1]:
+                # half of an explanation, which makes the readings worse by itself
+                rejected += [(one.candidate, ONLY_TOGETHER) for one in verdict.named]
+                verdict = replace(verdict, word="unknown", named=(), alternatives=())
+                final, disagreement, agreed = base, (), False
+    final = restore_unmoved_geometry(final)
+    verdict = with_estimates(verdict, final, result)
     # where an effect is missing in a model its own parameters compensate for that
     moved = refitted(final) if verdict.word not in ("ambiguous", "unknown") else ()
     verdict = replace(verdict, rejected=tuple(rejected), refitted=moved)
     where = residual_patterns(stated, result.confirmed)
-    return Diagnosis(stated, where, result, verdict, final, base, disagreement, agreed)
+    return Diagnosis(stated, where, result, verdict, final, base, disagreement, agreed, clear_is_better)
+
+
+def _squares(fitted: Fit, weights: Weighting) -> float:
+    """The squares that remain after a fit."""
+    residual = weights(np.nan_to_num(fitted.point.residual))
+    return float(residual @ residual)
 
 
 def _fitted_to(campaign: Campaign, fitted: Fit) -> Fit:

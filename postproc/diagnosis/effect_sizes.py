@@ -10,7 +10,7 @@ import numpy as np
 from postproc.base.arrays import Floats
 from postproc.diagnosis.candidates import Candidate
 from postproc.diagnosis.search_result import Search
-from postproc.diagnosis.selection import CHANCE, EXCEEDED, SLIGHT, WORTH, explained, scatter
+from postproc.diagnosis.selection import EXCEEDED, SLIGHT, WORTH, explained, gain_by_chance, scatter
 from postproc.diagnosis.verdict import Named
 from postproc.identification.fit import Fit
 from postproc.identification.least_squares import at
@@ -48,10 +48,8 @@ def gains(search: Search) -> Gains:
 
 def _needed(search: Search, rank: int) -> float:
     """The gain from which on a group of ``rank`` is taken in, one of all candidates."""
-    from scipy.special import chdtri
-
     given, last = search.linear.problem, search.explained
-    by_chance = float(chdtri(max(rank, 1), CHANCE / len(given.places)))
+    by_chance = gain_by_chance(given, max(rank, 1), given.freedom - last.rank, len(given.places))
     worth = SLIGHT if given.known and scatter(given, last) <= EXCEEDED else WORTH
     return max(by_chance, worth / (1.0 - worth) * max(1, given.freedom - last.rank))
 

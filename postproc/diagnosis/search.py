@@ -204,7 +204,8 @@ def _linear(
     residual = tall(sum(contributions, fitted.point.residual), away)
     columns = tuple(readings(c.columns) for c in current)
     groups = [(own, _reach(c)) for own, c in zip(columns, current, strict=True)]
-    linear_problem = problem(residual, basis, groups, weights.counts + len(prior), base.noise.known)
+    rows = weights.counts + len(prior)
+    linear_problem = problem(residual, basis, groups, rows, base.noise.known, campaign.poses)
     return Linear(current, linear_problem, residual, common, columns, len(prior), weights)
 
 

@@ -48,7 +48,8 @@ class Problem:
 
     residual (n,); matrix (n, P): all columns, each as long as 1 before its explained part was taken out; places: the
     columns of each group; reach (P, 2): how far each coefficient may go down and up from zero; size (P,): coefficient
-    over parameter in its scale; ``known``: the residual is in its standard deviations, else only ratios count.
+    over parameter in its scale; ``known``: the residual is in its standard deviations, else only ratios count;
+    ``clusters``: of readings that may share errors, whose number limits what is known of chance; 0: each for itself.
     """
 
     residual: Floats
@@ -58,6 +59,7 @@ class Problem:
     size: Floats
     rank: int
     known: bool
+    clusters: int = 0
 
     @property
     def freedom(self) -> int:
@@ -92,7 +94,12 @@ def outside(basis: Floats, columns: Floats) -> Floats:
 
 
 def problem(
-    residual: Floats, basis: Floats, groups: Sequence[tuple[Floats, Floats]], rows: int, known: bool
+    residual: Floats,
+    basis: Floats,
+    groups: Sequence[tuple[Floats, Floats]],
+    rows: int,
+    known: bool,
+    clusters: int = 0,
 ) -> Problem:
     """Of whitened ``residual`` (n,), a ``basis`` (n, r) of what is explained anyway, and (columns (n, p), reach (p, 2))
     of the groups.  ``rows`` of n count: the others are zero."""
@@ -109,7 +116,7 @@ def problem(
     remaining = outside(basis, residual[:, None])[:, 0]
     rank = basis.shape[1] + len(residual) - rows
     return Problem(
-        remaining, outside(basis, columns / size), places, reach * size[:, None], size, rank, known
+        remaining, outside(basis, columns / size), places, reach * size[:, None], size, rank, known, clusters
     )
 
 
@@ -204,14 +211,31 @@ def scatter(given: Problem, last: Explained) -> float:
 
 
 def probability(given: Problem, squares: float, rank: int, variance: float, freedom: int) -> float:
-    """That ``rank`` columns explain ``squares`` by chance."""
+    """That ``rank`` columns explain ``squares`` by chance.
+
+    Where readings come in clusters, what those share adds to the scatter, and is known from so many of them only: the F
+    distribution with one degree of freedom less than there are clusters (Cameron and Miller, J. Human Resources 50
+    (2015), Sec. VI).
+    """
     from scipy.special import chdtrc, fdtrc
 
     if rank == 0 or squares <= 0:
         return 1.0
-    if given.known and variance == 1.0:
+    if given.clusters:
+        freedom = min(freedom, given.clusters - 1)
+    elif given.known and variance == 1.0:
         return float(chdtrc(rank, squares))
     return float(fdtrc(rank, max(1, freedom), squares / rank / variance))
+
+
+def gain_by_chance(given: Problem, rank: int, freedom: int, among: int) -> float:
+    """The gain, in variances of a reading, that ``rank`` columns have with probability ``CHANCE`` by chance in any of
+    ``among`` groups."""
+    from scipy.special import chdtri, fdtri
+
+    if not given.clusters:
+        return float(chdtri(rank, CHANCE / among))
+    return float(rank * fdtri(rank, max(1, min(freedom, given.clusters - 1)), 1.0 - CHANCE / among))
 
 
 def selected(

@@ -72,6 +72,7 @@ NOT_ENOUGH = "too much would remain for a name"
 AS_WELL = "another course over the same joint explains as much, and more remains than scatter"
 OTHER_COURSE = "the readings follow another course than that of this effect"
 PART_OF_COURSE = "what it would explain is a part of that other course"
+ONLY_TOGETHER = "it fits only beside an effect that the readings cannot distinguish from others"
 SIZE_UNDETERMINED = "it would have to be unusually large, and the readings hardly determine its size"
 
 
@@ -377,6 +378,16 @@ def _joints(candidate: Candidate, estimates: Sequence[Estimate]) -> tuple[str, .
         return (candidate.joint,) if candidate.joint else ()
     clear = [e.unknown.parameter.joint for e in estimates if abs(e.value - e.unknown.parameter.null) > e.ci95]
     return tuple(dict.fromkeys(clear))
+
+
+def with_estimates(verdict: Verdict, final: Fit, search: Search) -> Verdict:
+    """The verdict with what ``final`` has of the parameters that are named; those that it does not have are as they
+    were found in ``search``."""
+    named = []
+    for one in verdict.named:
+        found = _estimates(final, one.candidate, search)
+        named.append(replace(one, estimates=found) if found else one)
+    return replace(verdict, named=tuple(named))
 
 
 def refitted(final: Fit) -> tuple[Estimate, ...]:

@@ -15,6 +15,7 @@ from postproc.diagnosis.diagnosis import Diagnosis
 from postproc.diagnosis.effect_sizes import Gains, Smallest, gains, moved, smallest
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
 from postproc.diagnosis.search_result import Key
+from postproc.diagnosis.selection import explained
 from postproc.diagnosis.verdict import Evidence, Named, Verdict, reduced_chi2_of
 from postproc.identification.fit import Estimate, Fit
 from postproc.measurements import Readings
@@ -145,7 +146,7 @@ class Diagnosed(Result):
         """Whether a new robot file would be better than the old one."""
         word = self.verdict.word
         if word == "ambiguous":
-            return self.diagnosis.agreed or bool(self.clear)
+            return self.diagnosis.agreed or (bool(self.clear) and self.diagnosis.clear_is_better)
         if word == "nothing_missing":
             return bool(self.verdict.refitted) or self._is_refitted
         return word in ("named", "partly_named")
@@ -168,6 +169,12 @@ class Diagnosed(Result):
         """Whether the residual clearly exceeds the scatter, with all effects found."""
         search = self.diagnosis.search
         return reduced_chi2_of(search, search.explained)[1] or bool(self.verdict.remainder)
+
+    @property
+    def needs_effects(self) -> bool:
+        """Whether the residual clearly exceeds the scatter without any effect that was found."""
+        search = self.diagnosis.search
+        return reduced_chi2_of(search, explained(search.linear.problem, ()))[1]
 
     # Residuals.
 

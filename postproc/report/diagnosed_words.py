@@ -61,6 +61,8 @@ def headline(result: Diagnosed) -> str:
         "ambiguous": f"ambiguous: {sets}{_either_way(result)}{f'; named: {names}' if names else ''}",
         "unknown": "unknown: no effect that was tried explains the residual"
         if result.scatter_exceeded
+        else "unknown: an effect is missing, and it is not clear which"
+        if result.needs_effects
         else "unknown: not clear whether an effect is missing",
     }[verdict.word]
     return f"{words} (if the residual is scatter)" if verdict.conditional else words
@@ -134,10 +136,12 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
         return
     measured = bool(result.diagnosis.disagreement)
     differ = f" by up to {_mm(largest)} mm" if measured and np.isfinite(largest) else ""
+    gets = "gets only what is clear" if result.improves else "is not changed"
+    if result.clear and not result.improves:
+        gets += ": what is clear would fit worse by itself"
     yield (
         f"Elsewhere in the workspace, or under other loads, their corrections differ{differ}, so the robot file"
-        f" {'gets only what is clear' if result.clear else 'is not changed'}. With all effects found the residual would"
-        f" be {_mm(result.rms['explained'])} mm."
+        f" {gets}. With all effects found the residual would be {_mm(result.rms['explained'])} mm."
     )
     yield from _more(result, "More is missing:", "explained")
     planned = result.next_poses
@@ -176,7 +180,13 @@ def _limited(result: Diagnosed) -> str:
 def _unknown(result: Diagnosed) -> Iterator[str]:
     search = result.diagnosis.search
     if not result.scatter_exceeded:
-        yield "It is not clear whether an effect is missing."
+        if result.needs_effects:
+            yield (
+                f"An effect is missing: the residual is {_mm(result.rms['after'])} mm RMS{_against_scatter(result)}."
+                " Which one is not clear."
+            )
+        else:
+            yield "It is not clear whether an effect is missing."
     else:
         yield (
             f"An effect is missing: the residual is {_mm(result.rms['after'])} mm RMS{_against_scatter(result)}. It is"

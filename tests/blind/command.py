@@ -7,9 +7,10 @@ import json
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -48,8 +49,8 @@ class Diagnosing:
             raise RuntimeError(f"the diagnosing process ended with {self.process.wait()}")
         ended = json.loads(line)
         told = folder / f"{new}.json"
-        answer = json.loads(told.read_text(encoding="utf-8")) if told.exists() else {"verdict": "refused"}
-        answer.setdefault("verdict", "refused")
+        answer = json.loads(told.read_text(encoding="utf-8")) if told.exists() else {}
+        answer.setdefault("verdict", "crashed" if ended["exit"] == -1 else "refused")
         return {**answer, "seconds": ended["seconds"], "told": ended["told"]}
 
     def close(self) -> None:
@@ -115,24 +116,34 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.blind", description=__doc__)
     parser.add_argument("--runs", type=int, default=300, help="of each row [300]")
     parser.add_argument("--rows", default=",".join(ROWS), help=f"some of {', '.join(ROWS)} [all]")
+    parser.add_argument("--first", type=int, default=0, help="number of the first run [0]")
     parser.add_argument("--seed", type=int, default=1, help="[1]")
     parser.add_argument("--workers", type=int, default=2, help="processes [2]")
     parser.add_argument(
-        "--out", type=Path, help="JSON lines, one a run: appended to, and what is there is not run again"
+        "--out",
+        type=Path,
+        help="JSON lines, one a run: appended to; what is there counts, whatever its seed, and is not run again",
     )
+    parser.add_argument("--minutes", type=float, default=np.inf, help="start no run after so many [no limit]")
     parser.add_argument("--picture", type=Path, help="the confusion as a PNG")
     parser.add_argument("--wrong", type=int, default=40, help="runs that were not right to list [40]")
     parser.add_argument("--only", default="", help="cases with this effect only")
     given = parser.parse_args(argv)
-    wanted = [case for row in given.rows.split(",") for case in cases(row, given.runs, given.seed)]
+    rows, count = given.rows.split(","), given.first + given.runs
+    wanted = [case for row in rows for case in cases(row, count, given.seed)[given.first :]]
     # all rows grow alike, whenever it is stopped
     wanted = sorted((c for c in wanted if given.only in ("", *c.effects)), key=lambda c: c.number)
-    records = kept_records(given.out, {case.key for case in wanted})
+    records = [
+        record
+        for record in kept_records(given.out)
+        if record["row"] in rows and given.only in ("", *record["effects"])
+    ]
     known = {record["key"] for record in records}
     left = [case for case in wanted if case.key not in known]
-    begun = time.monotonic()
-    for record in _run(left, given.workers):
+    begun, done = time.monotonic(), 0
+    for record in _run(left, given.workers, begun + 60.0 * given.minutes):
         records.append(record)
+        done += 1
         if given.out:
             with given.out.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(record) + "\n")
@@ -141,9 +152,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not records:
         return 0
     spent = time.monotonic() - begun
-    print(
-        f"seed {given.seed}, {len(records)} runs; {len(left)} of them now, {spent / max(1, len(left)):.1f} s each\n"
-    )
+    seeds = ", ".join(sorted({record["key"].split("/")[2] for record in records}))
+    print(f"seed {seeds}, {len(records)} runs; {done} of them now, {spent / max(1, done):.1f} s each\n")
     print("\n".join(table.matrix(records)) + "\n")
     print("\n".join(table.per_effect(records)) + "\n")
     print("\n".join(table.confusion_text(records)) + "\n")
@@ -153,21 +163,31 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _run(left: Sequence[Case], workers: int):
+def _run(left: Sequence[Case], workers: int, until: float) -> Iterator[dict]:
+    """The records of cases, in the order in which they are done; none is begun after ``until`` [s]."""
     if workers <= 1:
-        yield from map(_record_of, left)
+        for case in left:
+            if time.monotonic() > until:
+                return
+            yield _record_of(case)
         return
     with ProcessPoolExecutor(workers) as pool:
-        for done in as_completed([pool.submit(_record_of, case) for case in left]):
-            yield done.result()
+        coming = iter(left)
+        running = {pool.submit(_record_of, case) for case in islice(coming, workers)}
+        while running:
+            done, running = wait(running, return_when=FIRST_COMPLETED)
+            for one in done:
+                if time.monotonic() < until:
+                    running |= {pool.submit(_record_of, case) for case in islice(coming, 1)}
+                yield one.result()
 
 
-def kept_records(path: Path | None, keys: set[str]) -> list[dict]:
-    """What an earlier call came to; a last line that was cut off does not count."""
+def kept_records(path: Path | None) -> list[dict]:
+    """What earlier calls came to; a last line that was cut off does not count."""
     records: dict[str, dict] = {}
     if path is not None and path.exists():
         for line in path.read_text(encoding="utf-8").splitlines():
             with suppress(json.JSONDecodeError):
                 record = json.loads(line)
                 records[record["key"]] = record
-    return [record for key, record in records.items() if key in keys]
+    return list(records.values())

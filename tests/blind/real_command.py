@@ -1,12 +1,15 @@
-"""Runs the trials of ``real_worlds``: python -m tests.blind.real_command [--rows a,b] [--runs N] [--package FOLDER]"""
+"""Runs the trials of ``real_worlds``: python -m tests.blind.real_command [--rows a,b] [--runs N] [--append FILE]"""
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import sys
-from collections import defaultdict
+import time
+from collections import Counter, defaultdict
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -22,6 +25,7 @@ from blind import measured
 from blind.arm import model_of
 from blind.command import Diagnosing
 from blind.design import poses
+from blind.other_trials import arms, unknown
 from blind.real_worlds import TRIALS, Trial
 from blind.stated_scatter import sigma
 from blind.worker import ROOMS
@@ -58,12 +62,14 @@ def loss_of(answer: dict, accept, needed) -> int:
     return 1 if any(fits(pair, needed) for one in sets for pair in one) else 2
 
 
-ALL = {**TRIALS, "sigma": sigma}
+ALL = {**TRIALS, "sigma": sigma, "arms": arms, "unknown": unknown}
 """Row -> what makes its trials."""
 
 
 def fresh_gap(trial: Trial, model) -> float:
     """[m] root mean square at poses that were not measured, tracker and targets found anew."""
+    if trial.fresh:
+        return trial.fresh(model)
     rng = np.random.default_rng([trial.number, 9])
     old = trial.design
     q = poses(model_of(trial.files["robot.yaml"]), FRESH, old.tool, rng)
@@ -99,11 +105,12 @@ def judge(trial: Trial, answer: dict, new: Path) -> dict[str, bool | float]:
     word = answer["verdict"]
     names = pairs(answer)
     sets = sets_of(answer)
-    held: dict[str, bool | float] = {"refused": word == "refused"}
+    held: dict[str, bool | float] = {"refused": word in ("refused", "crashed"), "crashed": word == "crashed"}
     held["a name that is wrong"] = any(not fits(name, trial.accept) for name in names)
     if sets:
         everything = names.union(*sets)
         held["truth in the set"] = any(fits(pair, trial.needed or trial.accept) for pair in everything)
+    held["a set without truth"] = any(not any(fits(pair, trial.accept) for pair in one) for one in sets)
     if trial.needed:
         everything = names.union(*sets)
         held["named or in the set"] = any(
@@ -111,13 +118,13 @@ def judge(trial: Trial, answer: dict, new: Path) -> dict[str, bool | float]:
             {(n, "*") for n, _ in trial.needed}) for pair in everything
         )  # fmt: skip
     else:
-        held["nothing named"] = not names and word != "refused"
+        held["nothing named"] = not names and not held["refused"]
     if trial.row == "twin":
         held["one of two named"] = bool(names & set(trial.accept))
     held["file written"] = new.exists()
     if new.exists() and trial.row != "sigma":
         from postproc.model import StiffnessModel
-        from postproc.robot.description import load_robot
+        from postproc.robot.description import load_robot, robot_of
 
         found = StiffnessModel.from_robot(load_robot(new))
         values = [
@@ -128,7 +135,9 @@ def judge(trial: Trial, answer: dict, new: Path) -> dict[str, bool | float]:
         ]
         if trial.row in ("length", "twist", "scale"):
             held["shift or zero above 1 mm, 1 mrad"] = any(abs(v) > LARGE for _, v in values)
-        before = fresh_gap(trial, model_of(trial.files["robot.yaml"]))
+        before = fresh_gap(
+            trial, StiffnessModel.from_robot(robot_of(trial.files["robot.yaml"], Path("r.yaml")))
+        )
         after = fresh_gap(trial, found)
         held["gap closed"] = 1.0 - after / before if before > 1e-9 else 1.0
         solved = (
@@ -169,63 +178,119 @@ def share(values: Sequence[bool]) -> str:
     return f"{k:4d} of {n:4d}  {100 * k / n:5.1f} %  ({100 * low:.1f} .. {100 * high:.1f})"
 
 
+def record_of(trial: Trial, seed: int, diagnosing: Diagnosing) -> dict:
+    """What one line of the file of runs holds."""
+    held, answer = run(trial, diagnosing)
+    told = (
+        answer["told"].strip()[-300:].replace("\n", " ")
+        if answer["verdict"] in ("refused", "crashed")
+        else ""
+    )
+    return {
+        "row": trial.row,
+        "number": trial.number,
+        "seed": seed,
+        "words": trial.words,
+        "verdict": answer["verdict"],
+        "named": [" ".join([one["effect"], *one["joints"]]) for one in answer.get("named", ())],
+        "sets": [[c["label"] for c in one] for one in answer.get("alternatives", ())],
+        "held": {key: bool(v) if isinstance(v, bool | np.bool_) else float(v) for key, v in held.items()},
+        "seconds": answer["seconds"],
+        "told": told,
+    }
+
+
+def line_of(record: dict) -> str:
+    """A run in one line."""
+    sets = " | ".join(" = ".join(one) for one in record["sets"])
+    flags = ", ".join(
+        f"{k} {v:.3f}" if isinstance(v, float) else k for k, v in record["held"].items() if v is not False
+    )
+    return (
+        f"{record['row']} {record['number']}: {record['words']}: {record['verdict']}"
+        f" [{'; '.join(record['named'])}] {sets} <{flags}> {record['told']}"
+    )
+
+
+def table_of(records: Sequence[dict]) -> list[str]:
+    """Verdicts, shares with intervals and medians of each row."""
+    lines = []
+    for row in dict.fromkeys(record["row"] for record in records):
+        own = [record for record in records if record["row"] == row]
+        words = Counter(record["verdict"] for record in own)
+        lines.append(f"{row}: " + ", ".join(f"{n} {word}" for word, n in sorted(words.items())))
+        counts: dict[str, list] = defaultdict(list)
+        for record in own:
+            for key, value in record["held"].items():
+                counts[key].append(value)
+        for key, values in counts.items():
+            if key == NEW_OVER_OLD:
+                told = f"{np.median(values):.3f} in the median, {max(values):.3f} at worst, {len(values)}"
+            elif any(isinstance(v, float) for v in values):
+                middle, mean = 100 * np.median(values), 100 * np.mean(values)
+                told = f"{middle:.1f} % in the median, {mean:.1f} in the mean of {len(values)}"
+            else:
+                told = share(values)
+            lines.append(f"  {key:36} {told}")
+        seconds = [record["seconds"] for record in own]
+        lines.append(f"  seconds {np.median(seconds):.1f} in the median, {max(seconds):.1f} at most")
+    return [*lines, of_all(records)]
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.blind.real_command", description=__doc__)
     parser.add_argument("--rows", default=",".join(ALL), help="[all]")
     parser.add_argument("--runs", type=int, default=300, help="of each row [300]")
     parser.add_argument("--first", type=int, default=0, help="number of the first run [0]")
     parser.add_argument("--seed", type=int, default=1, help="[1]")
+    parser.add_argument("--minutes", type=float, default=np.inf, help="start no run after so many [no limit]")
+    parser.add_argument(
+        "--append",
+        type=Path,
+        help="JSON lines, one a run: what is there counts, whatever its seed, and is not run again",
+    )
     parser.add_argument("--verbose", action="store_true", help="a line for every run")
     given = parser.parse_args(argv)
+    rows, begun = given.rows.split(","), time.monotonic()
+    records = [one for one in kept(given.append) if one["row"] in rows]
+    known = {(one["row"], one["number"], one["seed"]) for one in records}
+    # all rows grow alike, whenever it is stopped
+    wanted = [(row, n) for n in range(given.first, given.first + given.runs) for row in rows]
     diagnosing = Diagnosing()
-    ratios: list[tuple[float, str]] = []
-    for row in given.rows.split(","):
-        counts: dict[str, list] = defaultdict(list)
-        words: dict[str, int] = defaultdict(int)
-        seconds = []
-        for number in range(given.first, given.first + given.runs):
-            trial = ALL[row](number, given.seed)
-            held, answer = run(trial, diagnosing)
-            words[answer["verdict"]] += 1
-            seconds.append(answer["seconds"])
-            if NEW_OVER_OLD in held:
-                ratios.append((float(held[NEW_OVER_OLD]), f"{row} {number}"))
-            for key, value in held.items():
-                counts[key].append(value)
-            if given.verbose:
-                names = "; ".join(
-                    f"{one['effect']} {' '.join(one['joints'])}" for one in answer.get("named", ())
-                )
-                sets = " | ".join(
-                    " = ".join(c["label"] for c in one) for one in answer.get("alternatives", ())
-                )
-                flags = ", ".join(
-                    f"{k} {v:.3f}" if isinstance(v, float) else k for k, v in held.items() if v is not False
-                )
-                told = (
-                    answer["told"].strip()[-150:].replace("\n", " ") if answer["verdict"] == "refused" else ""
-                )
-                print(f"{row} {number}: {trial.words}: {answer['verdict']} [{names}] {sets} <{flags}> {told}",
-                      flush=True)  # fmt: skip
-        print(f"{row}: " + ", ".join(f"{n} {word}" for word, n in sorted(words.items())))
-        for key, values in counts.items():
-            if key == NEW_OVER_OLD:
-                print(
-                    f"  {key:36} {np.median(values):.3f} in the median, {max(values):.3f} at worst, {len(values)}"
-                )
-            elif any(isinstance(v, float) for v in values):
-                middle, mean = 100 * np.median(values), 100 * np.mean(values)
-                print(f"  {key:36} {middle:.1f} % in the median, {mean:.1f} in the mean of {len(values)}")
-            else:
-                print(f"  {key:36} {share(values)}")
-        print(f"  seconds {np.median(seconds):.1f} in the median, {max(seconds):.1f} at most", flush=True)
+    for row, number in wanted:
+        if (row, number, given.seed) in known:
+            continue
+        if time.monotonic() - begun > 60.0 * given.minutes:
+            break
+        records.append(record_of(ALL[row](number, given.seed), given.seed, diagnosing))
+        if given.append:
+            with given.append.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(records[-1]) + "\n")
+        if given.verbose:
+            print(line_of(records[-1]), flush=True)
     diagnosing.close()
-    print(of_all(ratios))
+    print("\n".join(table_of(sorted(records, key=lambda one: rows.index(one["row"])))))
     return 0
 
 
-def of_all(ratios: Sequence[tuple[float, str]]) -> str:
+def kept(path: Path | None) -> list[dict]:
+    """What earlier calls came to; a last line that was cut off does not count."""
+    if path is None or not path.exists():
+        return []
+    records = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        with suppress(json.JSONDecodeError):
+            records.append(json.loads(line))
+    return records
+
+
+def of_all(records: Sequence[dict]) -> str:
     """What the robot files that were written leave of the gap at poses that were not measured."""
+    ratios = [
+        (one["held"][NEW_OVER_OLD], f"{one['row']} {one['number']}")
+        for one in records
+        if NEW_OVER_OLD in one["held"]
+    ]
     if not ratios:
         return f"{NEW_OVER_OLD}: no case"
     values = [ratio for ratio, _ in ratios]

@@ -16,6 +16,7 @@ from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.measurements import Readings
 from postproc.measurements.readings import alike
 from postproc.measurements.write_csv import measurements_csv
+from postproc.model import StiffnessModel
 
 from . import hidden, measured
 from .arm import COMPLIANCE, Scene, as_filed, model_of, robot_file
@@ -45,12 +46,14 @@ class Trial:
     files: dict[str, bytes]
     accept: frozenset[tuple[str, str]]
     needed: frozenset[tuple[str, str]]
-    scene: Scene
-    design: Design
+    scene: Scene | None
+    design: Design | None
     sigma: float
     words: str
     also: dict[str, bytes] = field(default_factory=dict)
     """The same readings, told in another way: with the scatter stated where it is not, say."""
+    fresh: Callable[[StiffnessModel], float] | None = None
+    """[m] what a model leaves at poses that were not measured, where ``scene`` and ``design`` do not say it."""
 
     @property
     def data(self) -> list[str]:

@@ -223,7 +223,7 @@ def picture(records: Records, path: Path) -> None:
 
 def wrong_cases(records: Records, limit: int) -> list[str]:
     """Runs that are not right, worst first: truth, verdict, names, alternatives."""
-    order = {"wrong": 0, "refused": 1, "unknown": 2, "missed": 3}
+    order = {"crashed": -1, "wrong": 0, "refused": 1, "unknown": 2, "missed": 3}
     bad = sorted(
         (r for r in records if not r["right"] and r["reached"]),
         key=lambda r: (order.get(r["outcome"], 4), -r["snr"]),

@@ -118,7 +118,7 @@ def outcome_of_words(
 ) -> str:
     apart = all(of and of[0].margin >= MARGIN for of in rivals if of)
     unseen = any(r.effect == "nothing" and r.margin < MARGIN for of in rivals for r in of)
-    if word in ("refused", "unknown"):
+    if word in ("refused", "crashed", "unknown"):
         return word
     if word == "nothing_missing":
         return "exact" if not truth else "unseen" if unseen else "missed"

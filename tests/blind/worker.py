@@ -10,6 +10,7 @@ import json
 import os
 import sys
 import time
+import traceback
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 
@@ -37,18 +38,21 @@ def guard(event: str, arguments: tuple) -> None:
 
 
 def ran(folder: str, words: list[str]) -> dict:
-    """What one command line came to, in ``folder``."""
+    """What one command line came to, in ``folder``, and its seconds of the processor; exit -1: it crashed."""
     global allowed_folder
     allowed_folder = os.path.abspath(folder)
     os.chdir(folder)
-    begun, told = time.perf_counter(), StringIO()
+    begun, told = time.process_time(), StringIO()
     try:
         with redirect_stdout(told), redirect_stderr(told):
             compensate(words)
         code = 0
     except SystemExit as ended:
         code = ended.code
-    return {"exit": code, "told": told.getvalue(), "seconds": time.perf_counter() - begun}
+    except Exception:
+        code = -1
+        told.write(traceback.format_exc())
+    return {"exit": code, "told": told.getvalue(), "seconds": time.process_time() - begun}
 
 
 def main() -> None:
