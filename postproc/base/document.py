@@ -11,7 +11,6 @@ import hashlib
 import io
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, pairwise
 from pathlib import Path
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 
 from postproc.base.array_storage import ArrayStore
 from postproc.base.arrays import Ints, sums
+from postproc.base.dataclass import dataclass
 
 Offsets = NDArray[np.signedinteger]
 """Byte offsets; 32 bits where they fit."""

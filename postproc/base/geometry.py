@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from postproc.base.arrays import Floats, Ints, is_shared, numbers
+from postproc.base.dataclass import dataclass
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from postproc.base.arrays import Floats, frozen
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import UNKNOWN, Poses, vector_from_rotation
 from postproc.base.units import DEG, MM

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from postproc.base.arrays import Floats, frozen
+from postproc.base.dataclass import dataclass
 from postproc.base.units import MM
 from postproc.base.yaml_section import YamlSection
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Placed, PoseRows, Poses
 from postproc.compensation.corner_points import ChosenPoints
 from postproc.compensation.correct import CorrectionResult

@@ -9,12 +9,13 @@ evaluated again.  Where the point alone is not enough, others are inserted besid
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import blocks, in_blocks
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Poses, lengths, product, rotation_from_vector
 from postproc.compensation.corner_division import CornerDivision, with_corners
 from postproc.compensation.corner_points import PointChooser

@@ -6,12 +6,13 @@ would be cut without any deflection, both with the parabolas of their approximat
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import each_block, in_blocks
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import lengths
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.problem import CompensationProblem

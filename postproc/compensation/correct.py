@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import each_block, in_blocks
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import Placed, PoseRows, Poses, lengths, product, rotation_from_vector
 from postproc.base.units import DEG, MM

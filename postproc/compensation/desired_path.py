@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import each_block
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import (
     UNKNOWN,
     Placed,

@@ -9,13 +9,14 @@ than the gap.  By so much the tool is off where an axis has just turned round.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import each_block
+from postproc.base.dataclass import dataclass
 from postproc.base.units import DEG, MM
 from postproc.compensation.gap_sides import GapSides, LostMotion, MotorPath, Reversals
 from postproc.compensation.problem import CompensationProblem, rotate_wrench

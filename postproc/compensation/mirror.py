@@ -8,12 +8,12 @@ the relative change of the deflection over the deflection itself, 2e-3 to 3e-3 o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Poses, lengths, product, rotation_from_vector, turn_between
 from postproc.compensation.load_case import LoadCase
 from postproc.model import StiffnessModel

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.base import rotary_words
 from postproc.base.arrays import Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Placed, Poses, product, rotation_from_vector, turned
 from postproc.toolpath import OrientationPath, Toolpath
 

@@ -6,12 +6,11 @@ a motion leaves on the part is the error across the feed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import in_blocks
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding
 from postproc.base.geometry import lengths
 from postproc.base.units import MM

@@ -9,11 +9,12 @@ error of the linear problem by raised weights (Lawson 1961).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.units import MM
 
 STEPS, WEIGHINGS, SECANTS = 24, 8, 4

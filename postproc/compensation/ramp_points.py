@@ -8,11 +8,12 @@ their coordinates are fitted to the curve of the commands by which the tool is o
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import PoseRows, lengths
 from postproc.base.units import MM
 from postproc.compensation.corner_division import commands_on_rounded_path

@@ -9,12 +9,12 @@ that is the quadratic Bezier curve with the end point as its control point.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Poses, lengths
 from postproc.base.units import MM
 from postproc.compensation.desired_path import interpolate_poses

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding
 from postproc.base.geometry import Placed, PoseRows
 from postproc.base.units import MM

@@ -8,11 +8,12 @@ program states x.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import Prediction, predict

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.base.arrays import Floats
+from postproc.base.dataclass import dataclass
 from postproc.cell import ForceVectorInterval
 from postproc.model import StiffnessModel
 from postproc.robot.description import COVERAGE

@@ -14,11 +14,12 @@ common to all motions, or to all of an operation, as two turns common to all mot
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Poses, lengths
 from postproc.cell import ForceVectorInterval
 from postproc.compensation.correct import CorrectionResult

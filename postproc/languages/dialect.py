@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from codecs import BOM_UTF8
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
 from postproc.base.arrays import Floats
+from postproc.base.dataclass import dataclass
 from postproc.base.document import Document, Edit, Span
 from postproc.base.findings import Finding
 from postproc.toolpath import Plan as Plan

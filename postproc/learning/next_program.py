@@ -9,11 +9,12 @@ at this place only, the smooth displacement that no cause explains.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Poses, turned
 from postproc.base.units import MM
 from postproc.compensation.desired_path import DesiredPath

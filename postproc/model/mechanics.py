@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Floats, frozen
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Poses
 from postproc.effects import ChainState, ComplianceLaw, Conditions, Effect, Load, Offset, Values
 from postproc.robot.chain import Chain, add_to_leaders, generalized_force

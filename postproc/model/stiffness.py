@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from postproc.base.arrays import Floats
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses
 from postproc.effects import Conditions, Effect

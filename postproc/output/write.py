@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from postproc import __version__
 from postproc.base.arrays import Floats, Ints, LazyRows, is_shared
 from postproc.base.batches import each_block
+from postproc.base.dataclass import dataclass
 from postproc.base.document import Document, Edit, Edits, apply, undone
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import PoseRows, Poses

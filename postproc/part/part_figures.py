@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
+from postproc.base.dataclass import dataclass
 
 FEATURES = ("floor", "wall", "slope")
 """By the angle of the normal to the spindle of the motion that made the surface: to 10 deg, from 80 deg, between."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
 from postproc.base.arrays import Floats
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import rotation_from_vector, turned
 from postproc.process.operation_names import OperationNames
 from postproc.process.wrenches import Wrenches

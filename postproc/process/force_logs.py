@@ -7,12 +7,11 @@ motions by the straight line between their ends, moves from and to axis position
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import blocks
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding, Refusal
 from postproc.base.tables import CsvTable
 from postproc.base.units import MM

@@ -11,11 +11,10 @@ nearer to each other than r add up.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding, Refusal
 from postproc.base.tables import read_table
 from postproc.cell import Cell, MotionFrames

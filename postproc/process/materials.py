@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import nearest
 from postproc.base.units import MM
 from postproc.base.yaml_section import YamlSection, load

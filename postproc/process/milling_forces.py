@@ -15,11 +15,10 @@ flutes do neither.  Source: Y. Altintas, Manufacturing Automation, mechanics of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.base.arrays import Floats
+from postproc.base.dataclass import dataclass
 
 DIRECTIONS = ("up", "down", "slot")
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.base.arrays import Ints
+from postproc.base.dataclass import dataclass
 from postproc.process.operations import join
 from postproc.process.process_file import Operation
 from postproc.toolpath import Toolpath

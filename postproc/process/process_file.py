@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from postproc.base.dataclass import dataclass
 from postproc.base.units import DEG, MM
 from postproc.base.yaml_section import YamlSection, load
 from postproc.process.materials import (

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 from postproc.base.batches import in_blocks
+from postproc.base.dataclass import dataclass
 
 FEW = 3
 """Readings that half a motion needs for a force that changes along it."""

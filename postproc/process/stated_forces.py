@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints, frozen
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import nearest
 
 LARGEST = 1e9

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, FewRows, Floats, Ints, frozen, is_shared, numbers
 from postproc.base.batches import blocks, in_blocks
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import lengths, turn_beside, turning
 from postproc.cell import Cell, MotionFrames

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding
 from postproc.base.units import MM
 from postproc.report.placement import OBJECTIVE_WORDS, CheckedShapes, PlacedFigures, checked_words

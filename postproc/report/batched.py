@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import SEVERITIES, Finding
 from postproc.report.result import Columns, Result, columns_of
 from postproc.report.result_keys import complete_result

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import CODES, Finding
 from postproc.base.geometry import abc_from_rotation
 from postproc.base.units import DEG, MM

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.base.arrays import Floats
 from postproc.base.batches import ROWS, in_blocks
+from postproc.base.dataclass import dataclass
 from postproc.base.decimals import Fours, fours, number_letters, text_of
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding
 from postproc.diagnosis.candidates import Candidate, names_of
 from postproc.diagnosis.diagnosis import Diagnosis

@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Ints, sums
 from postproc.base.batches import in_blocks
+from postproc.base.dataclass import dataclass
 from postproc.base.document import Document, Edit, Edits, gathered
 
 CONTEXT = 3

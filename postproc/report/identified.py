@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding
 from postproc.identification.fit import Estimate, Fit
 from postproc.identification.identifiable import strong_correlations

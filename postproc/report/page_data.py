@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import ROWS, in_blocks
+from postproc.base.dataclass import dataclass
 from postproc.base.document import Document, Edit, Edits, Span, apply
 from postproc.base.sanitize import sanitize
 from postproc.base.units import MM

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding
 
 WHOLE = 3000

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
-from rich.text import Text
 
+from postproc.base.dataclass import dataclass
 from postproc.base.sanitize import sanitize_lines
 from postproc.base.units import MM
 from postproc.compensation.uncertainty import Uncertainty
@@ -134,7 +133,7 @@ def reasons(data: PageData) -> list[str]:
 
 def program_facts(report: Report) -> list[tuple[str, str]]:
     """The lines that the terminal shows as well."""
-    return [(key, Text.from_markup(value).plain) for key, value in report_rows(report)]
+    return list(report_rows(report))
 
 
 def parameter_rows(model: Mapping[str, object]) -> list[dict[str, str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from rich.console import Console
@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from postproc.base.arrays import Floats
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding
 from postproc.base.geometry import abc_from_rotation
 from postproc.base.units import DEG, MM

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from postproc.base.arrays import Floats
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import SEVERITIES, Finding
 from postproc.base.units import MM
 from postproc.compensation.path_comparison import Transitions

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
 from postproc.report.formatting import in_decimals

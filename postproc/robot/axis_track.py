@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import each_block, in_blocks
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Topic
 from postproc.base.geometry import Placed, Poses, wrapped
 from postproc.base.units import DEG

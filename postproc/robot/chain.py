@@ -20,13 +20,14 @@ follows, whatever moves these: their motors or a load.  What pushes it therefore
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.robot.geometries import Joint
 

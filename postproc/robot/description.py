@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from pathlib import Path
 from statistics import NormalDist
@@ -12,6 +12,7 @@ from statistics import NormalDist
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints, frozen
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding, Refusal, nearest
 from postproc.base.geometry import Poses
 from postproc.base.read_files import read_file

@@ -14,12 +14,13 @@ one before it ends to where its own ends, as a controller takes synchronous axes
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints, is_shared
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Poses, rotation_from_vector, turned
 from postproc.base.units import DEG, MM
 from postproc.robot.description import Robot

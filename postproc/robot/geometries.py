@@ -7,12 +7,13 @@ into the frames of the joints once, here, so that no other place has to know of 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar
 
 import numpy as np
 
 from postproc.base.arrays import Floats, frozen
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Poses, rotation_from_vector
 
 Limits = Sequence[tuple[float, float]]

@@ -7,11 +7,10 @@ Other arms have neither: their branch is the one that leads on from the angles b
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Poses, wrapped
 from postproc.robot.chain import sine_and_cosine
 from postproc.robot.geometries import Geometry, KukaLengths, KukaVariant, SerialArm

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from datetime import date
 
 import numpy as np
 
 from postproc.base.arrays import Floats, frozen
+from postproc.base.dataclass import dataclass
 from postproc.base.yaml_section import YamlSection
 
 COMMANDS = ("identify", "diagnose", "learn")

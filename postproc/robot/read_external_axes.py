@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, frozen, is_shared
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding, Refusal
 from postproc.base.units import MM
 from postproc.base.yaml_section import YamlSection

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from xml.parsers import expat
 
 import numpy as np
 
 from postproc.base.arrays import Floats
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding, Refusal, nearest
 from postproc.base.geometry import Poses, rotation_from_abc
 from postproc.base.read_files import read_file

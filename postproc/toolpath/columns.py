@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.base.arrays import frozen, shared
+from postproc.base.dataclass import dataclass
 
 COLUMN = "column"
 """The key of a ``Column`` in the metadata of a dataclass's field."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Ints, frozen, shared
+from postproc.base.dataclass import dataclass
 
 
 @dataclass(frozen=True)

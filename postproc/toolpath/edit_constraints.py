@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding
 from postproc.toolpath.columns import MotionColumns, column, not_given
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import MappingProxyType
+
+from postproc.base.dataclass import dataclass
 
 Symbol = float | Mapping[str, float]
 """The value of a name that only the controller knows: a number, or an aggregate by its component (capitals)."""

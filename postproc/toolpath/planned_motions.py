@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import IntEnum
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints, LazyRows, frozen
+from postproc.base.dataclass import dataclass
 from postproc.toolpath.toolpath import Toolpath
 
 

@@ -7,13 +7,14 @@ neither knows of the other.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import IntEnum
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Bools, FewRows, Floats, Ints, frozen, shared
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding
 from postproc.base.geometry import Placed, Poses, abc_from_rotation, rotation_from_abc
 from postproc.base.units import DEG, MM

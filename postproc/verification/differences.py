@@ -3,11 +3,10 @@ air."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.base.arrays import Bools, FewRows, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import lengths, turn_between
 from postproc.base.units import MM
 from postproc.compensation.problem import CompensationProblem

@@ -6,12 +6,12 @@ the last one before a cut, which may lead to where the cut starts corrected.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import lengths
 from postproc.base.units import MM
 from postproc.compensation.problem import CompensationProblem

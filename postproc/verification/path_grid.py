@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints, sums
 from postproc.base.batches import each_block
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Poses, lengths
 from postproc.base.units import MM
 from postproc.compensation.problem import CompensationProblem

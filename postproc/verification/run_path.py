@@ -13,12 +13,12 @@ distance, and at most half of either motion.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints, sums
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Poses, lengths, product, rotation_from_vector, turn_between
 from postproc.compensation.problem import CompensationProblem
 

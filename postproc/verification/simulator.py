@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints, sums
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Poses, lengths, turn_between
 from postproc.base.units import MM
 from postproc.compensation.problem import CompensationProblem

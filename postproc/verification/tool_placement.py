@@ -21,12 +21,13 @@ So a corner holds the tool that is nearest to it, and a force that jumps has eve
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import each_block
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Poses, lengths, turn_between
 from postproc.base.units import MM
 from postproc.compensation.mirror import Prediction

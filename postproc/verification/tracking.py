@@ -7,11 +7,10 @@ programming over the candidates of each command; P. Newson and J. Krumm, 2009, d
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import lengths
 from postproc.base.units import MM
 from postproc.verification.path_grid import PathGrid

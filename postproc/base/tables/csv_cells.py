@@ -7,7 +7,6 @@ others go to the reader of single lines.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import overload
 
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.decimals import plain_decimals
 from postproc.base.tables.csv_lines import NOTHING, CsvLines
 from postproc.base.tables.csv_spelling import as_text

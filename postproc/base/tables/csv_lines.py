@@ -5,9 +5,9 @@ from __future__ import annotations
 import codecs
 import csv
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding, Refusal
 
 NOTHING = ' \t;,"'

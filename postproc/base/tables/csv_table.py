@@ -11,12 +11,12 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints, frozen
+from postproc.base.dataclass import dataclass
 from postproc.base.findings import Finding, Refusal, nearest
 from postproc.base.read_files import read_text_file
 from postproc.base.tables.csv_cells import CsvColumn, find_cells

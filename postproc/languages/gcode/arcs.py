@@ -7,12 +7,12 @@ begin and end, d their distance, n the normal of the chord on the side that the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import arc_through
 
 PLANES = np.array([[0, 1, 2], [2, 0, 1], [1, 2, 0]])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.base.arrays import Bools, Floats, Ints, is_shared
+from postproc.base.dataclass import dataclass
 from postproc.base.units import DEG, MM
 from postproc.languages.gcode.control import Control, Group, Move, Once
 from postproc.languages.gcode.execution_flow import FlowReason

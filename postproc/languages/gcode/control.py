@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from postproc.base.arrays import Floats
+from postproc.base.dataclass import dataclass
 from postproc.languages.gcode.expression_values import ExpressionLanguage
 from postproc.languages.gcode.words import Note, key
 

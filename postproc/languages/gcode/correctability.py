@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.document import Document
 from postproc.languages.gcode.blocks import AXES, FRAMED, BlockWords, Reasons, What
 from postproc.languages.gcode.control import Feed, Group, Move, Once

@@ -6,11 +6,12 @@ cycle ends, for blocks that leave them out.  LinuxCNC's manual, canned cycles; F
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.languages.gcode.blocks import AXES, BlockWords
 from postproc.languages.gcode.control import Group, Move
 from postproc.languages.gcode.cycle_ends import leaves_unknown

@@ -8,11 +8,11 @@ place and is marked: what it assigns is unknown after it.  A flow that cannot be
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Ints
+from postproc.base.dataclass import dataclass
 from postproc.languages.gcode.control import Control
 from postproc.languages.gcode.execution_flow import (
     LOCAL,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from enum import IntEnum
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Ints
+from postproc.base.dataclass import dataclass
 from postproc.languages.gcode.source import Source
 from postproc.languages.gcode.words import key
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+
+from postproc.base.dataclass import dataclass
 
 LONGEST = 400
 """Characters of an expression; a longer one is not evaluated."""

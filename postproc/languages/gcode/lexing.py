@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import re
 from codecs import BOM_UTF8
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.decimals import literals
 from postproc.languages.gcode.control import Control
 from postproc.languages.gcode.words import BlockSpans, How, Note, Text, WordArrays

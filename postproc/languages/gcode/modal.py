@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.languages.gcode.certain_flow import follow
 from postproc.languages.gcode.control import UNKNOWN, Control, Group, ModalCode, Move, Once
 from postproc.languages.gcode.execution import Execution

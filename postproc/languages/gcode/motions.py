@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.languages.gcode.arcs import ArcGeometry
 from postproc.languages.gcode.modal_fill import everywhere
 from postproc.languages.gcode.positions import Positions

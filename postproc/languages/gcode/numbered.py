@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Poses, rotation_from_abc
 from postproc.base.units import DEG
 from postproc.languages.gcode.blocks import AXES, BlockWords

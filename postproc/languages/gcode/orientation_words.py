@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import rotation_from_vector, vector_from_rotation
 from postproc.base.units import DEG
 

@@ -7,12 +7,12 @@ two changes of the frame it is solved for all blocks at once.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.languages.gcode.control import ProgrammedFrame
 
 MOST = 2000

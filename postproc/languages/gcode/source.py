@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.array_storage import GrowingColumns
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.languages.gcode.control import Control
 from postproc.languages.gcode.lexing import lex
 from postproc.languages.gcode.words import Note, key

@@ -5,11 +5,12 @@ Words are many: they are not kept, but lexed again of the rows that are asked fo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import Poses
 from postproc.languages.gcode.control import Control, Group, Move
 from postproc.languages.gcode.lexing import lex

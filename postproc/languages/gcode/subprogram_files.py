@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.document import Document
 from postproc.base.read_files import list_folder, note_absent, note_listing, read_file
 from postproc.languages.dialect import Program, ReadingSettings

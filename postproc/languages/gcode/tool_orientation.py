@@ -13,11 +13,10 @@ what says a direction runs on a great circle (ORIVECT, ORIPLANE); angles of the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.units import DEG
 from postproc.languages.gcode.blocks import BlockWords
 from postproc.languages.gcode.control import Group

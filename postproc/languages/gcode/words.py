@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 
 NAMES = 1 << 16
 """Keys from here on are a control's own names (CR, TURN): its ``Control.names`` numbers them."""

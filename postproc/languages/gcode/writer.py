@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints, differs
+from postproc.base.dataclass import dataclass
 from postproc.base.decimals import fixed
 from postproc.base.document import Edits
 from postproc.base.findings import Finding

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.geometry import arc_through, on_arc
 from postproc.languages.gcode.writer_text import PLANES
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from codecs import BOM_UTF8
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Ints, sums
+from postproc.base.dataclass import dataclass
 from postproc.base.document import Edit, Edits, Span
 from postproc.languages.dialect import Program, Role
 from postproc.languages.gcode.control import Move

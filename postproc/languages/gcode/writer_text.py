@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.units import MM
 from postproc.languages.dialect import WritingSettings
 from postproc.languages.gcode.blocks import SMALL_ANGLE

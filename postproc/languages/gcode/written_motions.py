@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.dataclass import dataclass
 from postproc.languages.dialect import Plan, Program, Role, WritingSettings
 from postproc.languages.gcode.source_map import SourceMapPart
 from postproc.languages.gcode.writer_text import ProgrammedWords, stated

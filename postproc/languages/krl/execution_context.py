@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import NamedTuple
 
+from postproc.base.dataclass import dataclass
 from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.languages.krl.data import Declarations

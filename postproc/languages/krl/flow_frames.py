@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from postproc.base.dataclass import dataclass
 from postproc.languages.core.persistent_map import PersistentMap
 from postproc.languages.krl.execution_context import Flow, SplineBlock
 from postproc.languages.krl.lexing import LOOPS

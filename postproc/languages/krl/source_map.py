@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.base.arrays import Ints
+from postproc.base.dataclass import dataclass
 from postproc.base.document import Offsets, Span
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.base.arrays import Bools, Floats
+from postproc.base.dataclass import dataclass
 from postproc.languages.krl.lexing import Statement
 
 

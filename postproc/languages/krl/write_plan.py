@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.base.arrays import Bools, Floats, Ints, differs
+from postproc.base.dataclass import dataclass
 from postproc.base.decimals import MOST_DECIMALS, fixed_one, literals
 from postproc.base.document import Document
 from postproc.base.geometry import abc_from_rotation

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from postproc.base.arrays import Floats, frozen
+from postproc.base.dataclass import dataclass
 from postproc.base.units import DEG, MM
 from postproc.base.yaml_section import YamlSection, load
 from postproc.process.materials import Material

@@ -13,10 +13,10 @@ Comments of other posts (FreeCAD, Mastercam) name a tool as the user called it, 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 import numpy as np
 
+from postproc.base.dataclass import dataclass
 from postproc.base.units import DEG, MM
 from postproc.toolpath import Kind, Toolpath
 
