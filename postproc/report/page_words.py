@@ -32,6 +32,8 @@ class Tile:
 
 def printed(text: str) -> str:
     """Text of a program or a file name as a page can hold it; its lines stay lines."""
+    if text.isascii() and text.isprintable():  # nearly every line
+        return text
     return sanitize_lines(text.encode("utf-8", "replace").decode("utf-8"))
 
 
