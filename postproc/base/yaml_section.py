@@ -66,9 +66,9 @@ CODES = define(
 
 MAX_BYTES = 4_000_000
 MAX_DEPTH = 20
-MAX_NODES = 100_000
 KEPT = 1 << 16
 """Letters of a text that is parsed once, however often its file is read."""
+MAX_NODES = 100_000
 """Values, lists and mappings: PyYAML takes 20 us and 500 bytes for each."""
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?\Z")
 _NONZERO = re.compile(r"[^eE]*[1-9]")
