@@ -121,9 +121,13 @@ def test_a_small_program_loads_what_it_needs(tmp_path):
     assert not libraries & {
         *("scipy", "pinocchio", "numba", "ruamel", "rich", "matplotlib", "distributed", "trimesh", "asyncio"),
     }
-    rooms = {".".join(name.split(".")[:3]) for name in loaded if name.startswith("postproc.")}
-    assert not {name for name in rooms if name.startswith(("postproc.placement", "postproc.learning"))}
-    assert not {name for name in loaded if name.startswith(("postproc.diagnosis", "postproc.identification"))}
+    rooms = {name.split(".")[1] for name in loaded if name.startswith("postproc.")}
+    assert not rooms & {"placement", "learning", "diagnosis", "identification", "experiments", "verification"}
+    assert "postproc.cli.program" in loaded
+    assert not {f"postproc.cli.{name}" for name in COMMANDS} & set(loaded) - {
+        "postproc.cli.program",
+        "postproc.cli.completion",
+    }
     assert not {name for name in loaded if name.startswith("postproc.languages.gcode.")} - {
         "postproc.languages.gcode.codes",
         "postproc.languages.gcode.detection",
