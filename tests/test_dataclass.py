@@ -148,6 +148,16 @@ def test_nothing_is_assigned(define):
         del one.own
 
 
+@pytest.mark.parametrize("kinds", [OURS, THEIRS])
+def test_what_counts_in_a_comparison(kinds):
+    made, plain = kinds["Made"], kinds["Plain"]
+    assert made([1], 2) == made([1], 3) != made([2], 3)
+    assert plain(1, "a") != plain(1, "b")
+    assert hash(plain(1, "a")) != hash(plain(1, "b"))
+    assert plain(1) != kinds["Derived"](1)
+    assert kinds["Derived"](1, last=2.0) != kinds["Derived"](1)
+
+
 def test_what_is_made_is_made_anew():
     assert OURS["Made"]().made is not OURS["Made"]().made
 

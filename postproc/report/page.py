@@ -267,9 +267,10 @@ def _finalized(value: object) -> object:
 
 @cache
 def _templates() -> jinja2.Environment:
+    settings = __version__.encode() + Path(__file__).read_bytes()  # they are below
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader(FOLDER),
-        bytecode_cache=CompiledTemplates(FOLDER / "__pycache__"),
+        bytecode_cache=CompiledTemplates(FOLDER / "__pycache__", settings),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         finalize=_finalized,
