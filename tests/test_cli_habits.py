@@ -15,6 +15,7 @@ from pathlib import Path
 
 import click
 import pytest
+from benchmarks.parts import program
 from conftest import CELL, LINES
 
 from postproc.cli.main import COMMANDS, normalized
@@ -100,6 +101,36 @@ def test_help_is_light():
         "matplotlib",
         "jinja2",
         "distributed",
+    }
+
+
+def test_a_small_program_loads_what_it_needs(tmp_path):
+    """Of the libraries and rooms that take their time to load, those that a short program has work for."""
+    path = program(tmp_path, "krl", 20)
+    code = (
+        "import sys, json; from postproc.cli.main import run\n"
+        "try: run(sys.argv[1:])\nexcept SystemExit as end: code = end.code\n"
+        "print(json.dumps([code, sorted(sys.modules)]))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(path), "--force", "-q"], capture_output=True, check=True, text=True
+    )
+    code, loaded = json.loads(done.stdout)
+    assert code == 0
+    libraries = {name.partition(".")[0] for name in loaded}
+    assert not libraries & {
+        *("scipy", "pinocchio", "numba", "ruamel", "rich", "matplotlib", "distributed", "trimesh", "asyncio"),
+    }
+    rooms = {name.split(".")[1] for name in loaded if name.startswith("postproc.")}
+    assert not rooms & {"placement", "learning", "diagnosis", "identification", "experiments", "verification"}
+    assert "postproc.cli.program" in loaded
+    assert not {f"postproc.cli.{name}" for name in COMMANDS} & set(loaded) - {
+        "postproc.cli.program",
+        "postproc.cli.completion",
+    }
+    assert not {name for name in loaded if name.startswith("postproc.languages.gcode.")} - {
+        "postproc.languages.gcode.codes",
+        "postproc.languages.gcode.detection",
     }
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
 from pathlib import Path
 
 import yaml
@@ -65,6 +66,8 @@ CODES = define(
 
 MAX_BYTES = 4_000_000
 MAX_DEPTH = 20
+KEPT = 1 << 16
+"""Letters of a text that is parsed once, however often its file is read."""
 MAX_NODES = 100_000
 """Values, lists and mappings: PyYAML takes 20 us and 500 bytes for each."""
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?\Z")
@@ -295,7 +298,7 @@ def parsed(raw: bytes, path: Path) -> YamlSection:
             Finding("YML001", f"the file is not UTF-8 text (byte {error.start})", str(path))
         ) from None
     try:
-        node = _Composed(_checked(path, yaml.parse(text, Loader=yaml.SafeLoader))).get_single_node()
+        node = (_nodes if len(text) <= KEPT else _nodes.__wrapped__)(text, path)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line, column = (mark.line + 1, mark.column + 1) if mark else (0, 0)
@@ -314,6 +317,12 @@ def parsed(raw: bytes, path: Path) -> YamlSection:
     if not isinstance(node, yaml.MappingNode):
         raise Refusal(_finding(path, node, "YML001", "the file must contain keys and values (YAML)"))
     return YamlSection(node, path, "")
+
+
+@lru_cache(maxsize=16)
+def _nodes(text: str, path: Path) -> yaml.Node | None:
+    """The nodes of a text.  Programs of one batch have one robot and mostly one cell: these are parsed once."""
+    return _Composed(_checked(path, yaml.parse(text, Loader=yaml.SafeLoader))).get_single_node()
 
 
 class _Composed(Composer, Resolver):

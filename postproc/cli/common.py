@@ -379,20 +379,34 @@ class Out:
         if self.quiet or not sys.stderr.isatty():
             yield lambda name: None
             return
-        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+        current = ["reading"]
+        shown: list[Any] = []
 
-        columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-        progress = Progress(*columns, console=self.console(error=True), transient=True)
-        task = progress.add_task("reading")
-        timer = threading.Timer(1.0, progress.start)
+        def show() -> None:
+            from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+            columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+            progress = Progress(*columns, console=self.console(error=True), transient=True)
+            progress.add_task(current[0])
+            shown.append(progress)
+            progress.start()
+
+        def name_stage(name: str) -> None:
+            current[0] = name
+            for progress in shown:
+                progress.update(progress.task_ids[0], description=name)
+
+        timer = threading.Timer(1.0, show)
         timer.daemon = True
         timer.start()
         try:
-            yield lambda name: progress.update(task, description=name)
+            yield name_stage
         finally:
             timer.cancel()
+            timer.join()  # it may be about to show
             with contextlib.suppress(OSError):  # the terminal may be gone
-                progress.stop()
+                for progress in shown:
+                    progress.stop()
 
     @contextlib.contextmanager
     def refusals(self, program: str = "", writes: bool = True) -> Iterator[None]:

@@ -15,10 +15,12 @@ WIDTH = 160
 
 
 class SafeConsole(Console):
-    """A console on ``stream`` that shows every character that is none to read as ``?``, but for the ends of lines."""
+    """A console on ``stream`` that shows every character that is none to read as ``?``, but for the ends of lines,
+    and no ``:name:`` as a picture."""
 
     def __init__(self, stream: TextIO) -> None:
-        super().__init__(file=stream, width=None if stream.isatty() else WIDTH, highlight=False)
+        width = None if stream.isatty() else WIDTH
+        super().__init__(file=stream, width=width, highlight=False, emoji=False)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         for segment in super().render(renderable, options):

@@ -2,57 +2,48 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import click
 
 from postproc import __version__
 from postproc.base.findings import nearest
 from postproc.base.memory import use_mmap_for_large_arrays
-from postproc.cli.assign import assign
-from postproc.cli.batch import batch
-from postproc.cli.check import check
-from postproc.cli.completion import Commands, completion
-from postproc.cli.diagnose import diagnose
-from postproc.cli.engage import engage
-from postproc.cli.identify import identify
-from postproc.cli.learn import learn
-from postproc.cli.map import map_
-from postproc.cli.place import place
-from postproc.cli.plan import plan
-from postproc.cli.posts import posts
-from postproc.cli.predict import predict
-from postproc.cli.program import program
-from postproc.cli.robots import robots
-from postproc.cli.schema import schema
+from postproc.cli.completion import Commands
 from postproc.cli.signals import ended_in_words
 from postproc.cli.streams import guarded_streams
-from postproc.cli.verify import verify
-from postproc.cli.watch import watch
 from postproc.output.publications import publications
 
-COMMANDS = {
-    "program": program,
-    "check": check,
-    "predict": predict,
-    "verify": verify,
-    "map": map_,
-    "place": place,
-    "assign": assign,
-    "engage": engage,
-    "identify": identify,
-    "plan": plan,
-    "diagnose": diagnose,
-    "learn": learn,
-    "batch": batch,
-    "watch": watch,
-    "robots": robots,
-    "posts": posts,
-    "schema": schema,
-    "completion": completion,
-}
+
+class _CommandModules(Mapping[str, click.Command]):
+    """Each command of its own module, which has its name: loaded when it is asked for, as a run has one command."""
+
+    names = (
+        *("program", "check", "predict", "verify", "map", "place", "assign", "engage", "identify", "plan"),
+        *("diagnose", "learn", "batch", "watch", "robots", "posts", "schema", "completion"),
+    )
+
+    def __getitem__(self, name: str) -> click.Command:
+        if name not in self.names:
+            raise KeyError(name)
+        module = importlib.import_module(f"postproc.cli.{name}")
+        command: click.Command = getattr(module, "map_" if name == "map" else name)
+        return command
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+COMMANDS = _CommandModules()
 
 
 @click.group(cls=Commands, commands=COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})

@@ -82,7 +82,6 @@ def program(
     """
     from postproc.base.input_files import provided
     from postproc.cli.streams import write_bytes
-    from postproc.report.terminal import show
     from postproc.workflows.preparation import Request
     from postproc.workflows.program import compensate
 
@@ -130,6 +129,8 @@ def program(
         write_bytes(content)
     out.result(done.as_json(), written=True)
     if not out.quiet:
+        from postproc.report.terminal import show
+
         with contextlib.suppress(OSError):  # the terminal may be gone; what is written is written
             show(out.console(), done, verbose)
         if dry_run:

@@ -7,11 +7,12 @@ largest error of each set is compared with the predicted one (Monte Carlo propag
 
 from __future__ import annotations
 
+from functools import cache
 from statistics import NormalDist
 
 import numpy as np
 
-from postproc.base.arrays import Floats, Ints
+from postproc.base.arrays import Floats, Ints, frozen
 from postproc.robot.description import COVERAGE
 
 DRAWS, FIRST, SEED = 10_000, 500, 20240229
@@ -84,14 +85,20 @@ def expanded_uncertainty_of_largest(error: Floats, sensitivity: Floats, covarian
     rooted = rooted @ axes[:, weight > 1e-8 * weight.max(initial=0.0)]
     if not rooted.shape[2]:
         return 0.0
-    rng, normal = np.random.default_rng(SEED), NormalDist()
-    even = np.array([normal.inv_cdf((i + 0.5) / DRAWS) for i in range(DRAWS)])
-    drawn = np.stack([rng.permutation(even) for _ in range(rooted.shape[2])])
+    rng = np.random.default_rng(SEED)
+    drawn = np.stack([rng.permutation(_even()) for _ in range(rooted.shape[2])])
     first, _ = _largest(error, rooted, drawn[:, :FIRST])
     often = np.bincount(first, minlength=len(error))
     motions = np.sort(np.argsort(-often, kind="stable")[: min(MOST, np.count_nonzero(often))])
     _, size = _largest(error[motions], rooted[motions], drawn)
     return float(np.quantile(np.abs(size - np.linalg.norm(error, axis=1).max()), 0.95))
+
+
+@cache
+def _even() -> Floats:
+    """(``DRAWS``,) standard normal figures, one of the middle of each of as many equal parts of all cases."""
+    normal = NormalDist()
+    return frozen([normal.inv_cdf((i + 0.5) / DRAWS) for i in range(DRAWS)])
 
 
 def _largest(error: Floats, rooted: Floats, drawn: Floats) -> tuple[Ints, Floats]:

@@ -27,6 +27,7 @@ from postproc.base.system import relative_path
 from postproc.compensation.correct import MotionOutcome
 from postproc.compensation.problem import CompensationProblem
 from postproc.part.part_figures import PartError
+from postproc.report.compiled_templates import CompiledTemplates
 from postproc.report.page_data import PageData
 from postproc.report.page_words import (
     badge,
@@ -266,8 +267,10 @@ def _finalized(value: object) -> object:
 
 @cache
 def _templates() -> jinja2.Environment:
+    settings = __version__.encode() + Path(__file__).read_bytes()  # they are below
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader(FOLDER),
+        bytecode_cache=CompiledTemplates(FOLDER / "__pycache__", settings),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         finalize=_finalized,

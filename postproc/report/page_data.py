@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -11,7 +10,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import ROWS, in_blocks
-from postproc.base.document import Document, Edit, Edits, Span, apply
+from postproc.base.document import Document, Edit, Edits
 from postproc.base.sanitize import sanitize
 from postproc.base.units import MM
 from postproc.compensation.correct import CorrectionResult, MotionOutcome
@@ -194,26 +193,32 @@ def source_texts(
     document: Document, lines: Sequence[int], edits: Iterable[Edit]
 ) -> list[tuple[str, tuple[str, ...]]]:
     """The text of each of ``lines`` (from 1) before, and what the edits make of it; "" of a line that is not there."""
-    every, starts, raw = Edits.joined(edits), document.line_starts, document.raw
-    high = bisect_left(every.file, 1)
+    every, raw = Edits.joined(edits), document.raw
+    starts = np.append(document.line_starts, len(raw))
+    numbers = np.asarray(lines, np.int64).reshape(-1)
+    there = (numbers > 0) & (numbers < len(starts))
+    numbers = np.where(there, numbers, 1)
+    own = every.start[: np.searchsorted(every.file, 1)]
+    bounds = (starts[numbers - 1], starts[numbers])
+    low, high = (np.searchsorted(own, bound.astype(own.dtype)).tolist() for bound in bounds)
     texts: list[tuple[str, tuple[str, ...]]] = []
-    for line in lines:
-        if not 0 < line <= len(starts):
+    for known, start, stop, first, last in zip(
+        there.tolist(), *map(np.ndarray.tolist, bounds), low, high, strict=True
+    ):
+        if not known:
             texts.append(("", ()))
             continue
-        start = int(starts[line - 1])
-        stop = raw.find(b"\n", start) + 1 or len(raw)
-        own = every[bisect_left(every.start, start, 0, high) : bisect_left(every.start, stop, 0, high)]
-        piece = Document(document.path, raw[start:stop])
-        after = apply(piece, [_moved(edit, start) for edit in own]).splitlines()
+        parts, at = [], start
+        for k in range(first, last):
+            parts += [raw[at : int(every.start[k])], every.texts[int(every.ends[k]) : int(every.ends[k + 1])]]
+            at = int(every.stop[k])
+        source = raw[start:stop].rstrip(b"\r\n")
+        after = b"".join([*parts, raw[at:stop]]).splitlines()
         more = [f"and {len(after) - LINES} more lines"] if len(after) > LINES else []
-        texts.append((_text(piece.raw.rstrip(b"\r\n")), tuple([_text(row) for row in after[-LINES:]] + more)))
+        text = _text(source)
+        written = [text if row == source else _text(row) for row in after[-LINES:]]
+        texts.append((text, tuple(written + more)))
     return texts
-
-
-def _moved(edit: Edit, start: int) -> Edit:
-    """The edit in a part of its document that starts at ``start``."""
-    return Edit(Span(0, edit.span.start - start, edit.span.stop - start), edit.text)
 
 
 def _text(raw: bytes) -> str:

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from rich.text import Text
 
 from postproc.base.sanitize import sanitize_lines
 from postproc.base.units import MM
@@ -33,6 +32,8 @@ class Tile:
 
 def printed(text: str) -> str:
     """Text of a program or a file name as a page can hold it; its lines stay lines."""
+    if text.isascii() and text.isprintable():  # nearly every line
+        return text
     return sanitize_lines(text.encode("utf-8", "replace").decode("utf-8"))
 
 
@@ -134,7 +135,7 @@ def reasons(data: PageData) -> list[str]:
 
 def program_facts(report: Report) -> list[tuple[str, str]]:
     """The lines that the terminal shows as well."""
-    return [(key, Text.from_markup(value).plain) for key, value in report_rows(report)]
+    return list(report_rows(report))
 
 
 def parameter_rows(model: Mapping[str, object]) -> list[dict[str, str]]:

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
-from rich.text import Text
+from typing import TYPE_CHECKING
 
 from postproc.base.findings import Finding
 from postproc.base.sanitize import sanitize
@@ -20,6 +16,11 @@ from postproc.report.part_report import part_rows
 from postproc.report.program_verdict import verdict_sentence
 from postproc.report.report import PathFigures, Report, Spread
 
+if TYPE_CHECKING:  # takes its time to load: only where something is printed
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
 _STYLES = {"info": "cyan", "warning": "yellow", "error": "bold red"}
 NAMED = 3
 """Parameters that the line on the uncertainty names."""
@@ -27,7 +28,9 @@ NAMED = 3
 
 def show(console: Console, report: Report, verbose: bool = False) -> None:
     """The table of one program, its findings, and where things are."""
-    show_rows(console, report_rows(report))
+    from rich.text import Text
+
+    show_rows(console, ((key, Text(value)) for key, value in report_rows(report)))
     if report.worst:
         console.print(_worst(report))
     show_findings(console, report.findings, verbose)
@@ -36,7 +39,9 @@ def show(console: Console, report: Report, verbose: bool = False) -> None:
 
 
 def show_rows(console: Console, rows: Iterable[tuple[str, str | Text]]) -> None:
-    """Keys, in bold, and what belongs to them."""
+    """Keys, in bold, and what belongs to them; a ``str`` may have markup."""
+    from rich.table import Table
+
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="bold")
     table.add_column()
@@ -46,15 +51,15 @@ def show_rows(console: Console, rows: Iterable[tuple[str, str | Text]]) -> None:
 
 
 def report_rows(report: Report) -> Iterable[tuple[str, str]]:
+    """Keys, and what belongs to them as plain text."""
     cuts = _count(report.cuts, "cut")
     yield (
         "program",
-        escape(f"{report.program} ({report.dialect}), {report.motions} motions,")
-        + f" {report.cutting} cutting in {cuts}",
+        f"{report.program} ({report.dialect}), {report.motions} motions, {report.cutting} cutting in {cuts}",
     )
-    yield "robot", escape(report.robot)
+    yield "robot", report.robot
     peak = "" if math.isnan(report.force_peak_n) else f", peaks up to {report.force_peak_n:.0f} N"
-    yield "force", escape(f"{report.force_source}, at most {report.force_max_n:.0f} N{peak}")
+    yield "force", f"{report.force_source}, at most {report.force_max_n:.0f} N{peak}"
     yield "errors", "predicted, at the end points of cutting motions"
     before = _spread(report.before, _interval(report.uncertainty, report.uncertainty.before))
     yield "error before", f"{before}, orientation {_deg(report.angle_before_deg)}"
@@ -83,11 +88,11 @@ def report_rows(report: Report) -> Iterable[tuple[str, str]]:
             yield "transitions", _transitions(report.path)
     if report.uncertainty.worst >= 0:
         first, *more = _uncertainty(report)
-        yield "uncertainty", escape(first)
+        yield "uncertainty", first
         for line in more:
-            yield "", escape(line)
+            yield "", line
     if sentence := verdict_sentence(report):
-        yield "verdict", escape(sentence)
+        yield "verdict", sentence
 
 
 def _count(number: int, word: str) -> str:
@@ -126,6 +131,8 @@ def _transitions(path: PathFigures) -> str:
 
 
 def _worst(report: Report) -> Table:
+    from rich.table import Table
+
     table = Table(title="largest errors", title_justify="left", title_style="", box=None, pad_edge=False)
     for head in ("line", "before mm", "correction mm", "after mm", "force N"):
         table.add_column(head, justify="right")
@@ -138,6 +145,8 @@ def _worst(report: Report) -> Table:
 
 def show_findings(console: Console, findings: Sequence[Finding], verbose: bool = True) -> None:
     """``file:line:column CODE message``, the help below it."""
+    from rich.text import Text
+
     for finding in findings:
         line = Text()
         if finding.place:

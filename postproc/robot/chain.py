@@ -138,6 +138,8 @@ class Chain:
             names.append(joint.name)
             self._add(np.eye(3), joint.kind == "revolute")
         self._tip = self._at @ flange
+        placements = [*self._arm, (self._tip.rotation, self._tip.position, False)]
+        self._steps = [([_terms(column) for column in r.T], _terms(p), turns) for r, p, turns in placements]
         self._tool = [name for name in (f"tool.{axis}" for axis in _SIX) if name in wanted]
         self._spindle = [name for name in ("spindle.x", "spindle.y", "spindle.z") if name in wanted]
         self.names = (*names, *self._tool, *self._spindle)
@@ -209,9 +211,9 @@ class Chain:
         position = np.zeros((3, 1))
         links = []
         motors = set(self.motor_rows.tolist())
-        for i, (rotation, translation, turns) in enumerate(self._arm):
+        for i, (rotation, translation, turns) in enumerate(self._steps[:-1]):
             position = _along(columns, translation, position)
-            columns = [_along(columns, column) for column in rotation.T]
+            columns = [_along(columns, column) for column in rotation]
             axes.append(columns[2])
             origins.append(position)
             if turns:
@@ -220,8 +222,9 @@ class Chain:
                 position = position + coordinates[i] * columns[2]
             if i in motors:
                 links.append(_of_all(columns, count))
-        position = _along(columns, self._tip.position, position)
-        columns = [_along(columns, column) for column in self._tip.rotation.T]
+        rotation, translation, _ = self._steps[-1]
+        position = _along(columns, translation, position)
+        columns = [_along(columns, column) for column in rotation]
         flange = _of_all(columns, count), _of_all([position], count)[0]
         position = position + _combined(columns, tool.position)
         beyond: Floats | None = tool.rotation
@@ -359,7 +362,7 @@ def add_to_leaders(force: Floats, couplings: Sequence[tuple[int, int, float]]) -
 
 def cross(a: Floats, b: Floats) -> Floats:
     """a x b (3, N) of ``a``, ``b`` (3, N)."""
-    vectors = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    vectors = np.empty(a.shape if a.shape == b.shape else np.broadcast_shapes(a.shape, b.shape))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         np.multiply(a[j], b[k], out=vectors[i])
         vectors[i] -= a[k] * b[j]
@@ -406,13 +409,16 @@ def _of_all(columns: Sequence[Floats], count: int) -> tuple[Floats, ...]:
     )
 
 
-def _along(columns: Sequence[Floats], weights: Floats, start: Floats | None = None) -> Floats:
-    """start + sum of weight * column; the many zeros of a robot's placements cost nothing."""
+def _terms(weights: Floats) -> list[tuple[int, float]]:
+    """Numbers of columns, and their weights: the many zeros of a robot's placements cost nothing."""
+    return [(k, weight) for k, weight in enumerate(weights.tolist()) if weight != 0.0]
+
+
+def _along(columns: Sequence[Floats], terms: list[tuple[int, float]], start: Floats | None = None) -> Floats:
+    """start + sum of weight * column."""
     total = start
-    for column, weight in zip(columns, weights, strict=True):
-        if weight == 0.0:
-            continue
-        term = column if weight == 1.0 else weight * column
+    for k, weight in terms:
+        term = columns[k] if weight == 1.0 else weight * columns[k]
         total = term if total is None else total + term
     return np.zeros_like(columns[0]) if total is None else total
 
@@ -420,7 +426,7 @@ def _along(columns: Sequence[Floats], weights: Floats, start: Floats | None = No
 def _combined(columns: Sequence[Floats], weights: Floats) -> Floats:
     """Sum of weight * column (3, N); ``weights`` (3,) for all states or (N, 3)."""
     if weights.ndim == 1:
-        return _along(columns, weights)
+        return _along(columns, _terms(weights))
     return columns[0] * weights[:, 0] + columns[1] * weights[:, 1] + columns[2] * weights[:, 2]
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.base.document import Document
-from postproc.languages.gcode import LINUXCNC, GcodeDialect
+from postproc.languages import DIALECTS
 from postproc.toolpath import Kind
 
 from .blocks import Made
@@ -78,7 +78,7 @@ UNSAID = ("GCO020", "GCO021", "GCO022", "GCO023", "GCO027", "GCO028")
 def read(made: Made) -> Reading:
     """The reader's result for a program."""
     path = Path("made.ngc")
-    program = GcodeDialect(LINUXCNC).read((Document(path, made.text.encode("latin-1")),))
+    program = DIALECTS["linuxcnc"].read((Document(path, made.text.encode("latin-1")),))
     toolpath = program.toolpath
 
     def number(index: int) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from postproc.base.document import Document, Edit
 from postproc.languages.dialect import (
@@ -19,27 +20,22 @@ from postproc.languages.dialect import (
 )
 from postproc.languages.gcode import codes as codes
 from postproc.languages.gcode import detection
-from postproc.languages.gcode.code_tables import FANUC, LINUXCNC
-from postproc.languages.gcode.control import Control
-from postproc.languages.gcode.kuka_cnc import CONTROL as KUKA_CNC
-from postproc.languages.gcode.sinumerik import CONTROL as SINUMERIK
-from postproc.languages.gcode.sinumerik import with_tools
+
+if TYPE_CHECKING:
+    from postproc.languages.gcode.control import Control
 
 
 @dataclass(frozen=True)
 class GcodeDialect:
     """G-code of one control as a ``Dialect``.
 
-    semicolon: comments begin with one, parentheses are none; prepared: the control with what a program names.
+    control: its table, with what a program of these bytes names; made where it is asked for, as tables take their time
+    to build.  semicolon: comments begin with one, parentheses are none.
     """
 
-    control: Control
+    name: str
+    control: Callable[[bytes], Control]
     semicolon: bool = False
-    prepared: Callable[[bytes], Control] | None = None
-
-    @property
-    def name(self) -> str:
-        return self.control.name
 
     @property
     def family(self) -> str:
@@ -61,14 +57,13 @@ class GcodeDialect:
     ) -> tuple[Document, ...]:
         from postproc.languages.gcode import subprogram_files
 
-        return subprogram_files.find(program, settings, beside) if self.name != KUKA_CNC.name else ()
+        return subprogram_files.find(program, settings, beside) if self.name != "kuka_cnc" else ()
 
     def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
         raw = b"\n".join(one.raw for one in (documents[0], *settings.siblings))
-        control = self.control if self.prepared is None else self.prepared(raw)
         from postproc.languages.gcode import reader  # takes its time to load
 
-        return reader.read(documents, control, settings)
+        return reader.read(documents, self.control(raw), settings)
 
     def edit_targets(self, program: Program, plan: Plan, writing: WritingSettings) -> EditedTargets:
         from postproc.languages.gcode import writer
@@ -85,10 +80,34 @@ class GcodeDialect:
         return []
 
 
+def _kuka_cnc(raw: bytes) -> Control:
+    from postproc.languages.gcode.kuka_cnc import CONTROL
+
+    return CONTROL
+
+
+def _sinumerik(raw: bytes) -> Control:
+    from postproc.languages.gcode.sinumerik import with_tools
+
+    return with_tools(raw)
+
+
+def _fanuc(raw: bytes) -> Control:
+    from postproc.languages.gcode.code_tables import FANUC
+
+    return FANUC
+
+
+def _linuxcnc(raw: bytes) -> Control:
+    from postproc.languages.gcode.code_tables import LINUXCNC
+
+    return LINUXCNC
+
+
 DIALECTS = (
-    GcodeDialect(KUKA_CNC, semicolon=True),
-    GcodeDialect(SINUMERIK, semicolon=True, prepared=with_tools),
-    GcodeDialect(FANUC),
-    GcodeDialect(LINUXCNC),
+    GcodeDialect("kuka_cnc", _kuka_cnc, semicolon=True),
+    GcodeDialect("sinumerik", _sinumerik, semicolon=True),
+    GcodeDialect("fanuc", _fanuc),
+    GcodeDialect("linuxcnc", _linuxcnc),
 )
 """In the order in which they are asked whether a file is theirs."""

@@ -6,8 +6,6 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-from postproc.languages.gcode import kuka_cnc, sinumerik
-
 SUFFIXES = frozenset(
     f".{suffix}"
     for suffix in (
@@ -54,9 +52,27 @@ def is_fanuc(path: Path, raw: bytes) -> bool:
     return is_gcode(path, raw) and _FANUC.search(raw[:BEGIN]) is not None
 
 
+def is_kuka_cnc(path: Path, raw: bytes) -> bool:
+    """A # command."""
+    if not is_gcode(path, raw):
+        return False
+    from postproc.languages.gcode import kuka_cnc  # takes its time to load
+
+    return kuka_cnc.claims(raw)
+
+
+def is_sinumerik(path: Path, raw: bytes) -> bool:
+    """A suffix of its own, or words that no other control has."""
+    if not is_gcode(path, raw):
+        return False
+    from postproc.languages.gcode import sinumerik  # takes its time to load
+
+    return sinumerik.claims(path.suffix, raw)
+
+
 CLAIMS: dict[str, Callable[[Path, bytes], bool]] = {
-    "kuka_cnc": lambda path, raw: is_gcode(path, raw) and kuka_cnc.claims(raw),
-    "sinumerik": lambda path, raw: is_gcode(path, raw) and sinumerik.claims(path.suffix, raw),
+    "kuka_cnc": is_kuka_cnc,
+    "sinumerik": is_sinumerik,
     "fanuc": is_fanuc,
     "linuxcnc": is_gcode,
 }
