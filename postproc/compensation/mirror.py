@@ -98,7 +98,8 @@ def mirror(
 
     ``orientation_projection`` (N, 3, 3): projection onto the rotation vectors that can be corrected (all of them
     without it); nothing else of the orientation is corrected, nor judged.  ``guess``: commands to start with instead of
-    ``wanted``, and displacements (N, m) [rad, m] to start their equilibria with; the result does not depend on them.
+    ``wanted``, turned from it as far as can be corrected, and displacements (N, m) [rad, m] to start their equilibria
+    with; the result does not depend on them.
 
     A motion stops when it is within tolerance, out of reach, without equilibrium, or when an iteration does not at
     least halve its error (it would not settle): ``converged`` states which, nothing diverges silently.
@@ -106,6 +107,8 @@ def mirror(
     n = len(wanted)
     first, displacement = (wanted, None) if guess is None else guess
     rotation, position = first.rotation.copy(), first.position.copy()
+    if guess is not None and orientation_projection is not None:
+        rotation = _turned_as_possible(wanted.rotation, rotation, orientation_projection)
     q, iterations = case.q_reference.copy(), np.zeros(n, np.int64)
     reachable, settled, converged = np.ones(n, bool), np.ones(n, bool), np.zeros(n, bool)
     history: list[Floats] = []
@@ -155,6 +158,14 @@ def mirror(
         settled,
         converged,
     )
+
+
+def _turned_as_possible(wanted: Floats, guess: Floats, projection: Floats) -> Floats:
+    """``wanted`` (N, 3, 3), turned to ``guess`` (N, 3, 3) by what the projections (N, 3, 3) leave of that turn."""
+    if not projection.any():
+        return wanted.copy()
+    turn = (projection @ turn_between(wanted, guess)[..., None])[..., 0]
+    return product(rotation_from_vector(turn), wanted)
 
 
 def initial_guess(

@@ -205,7 +205,7 @@ class CompensationProblem:
         """The commands (K) that bring the tool to ``goal`` (K) in motions ``rows`` (K,) under ``wrench`` (K, 6) [N, N
         m], at ``share`` (K,) of their paths or at their ends.  ``start``: poses (K) and displacements (K, m) [rad, m]
         as ``start_command`` gives them, where they are known."""
-        if start is None and self.turn_freely(rows):
+        if start is None:
             start = self.start_command(rows, wanted, wrench, goal, share=share)
         placed = self.robot_from_path(rows, share)
         if placed is not None:
@@ -218,7 +218,7 @@ class CompensationProblem:
             goal,
             self._load_case(rows, wrench, self._to_be(rows, share), share),
             turns,
-            start if turns is None else None,
+            start,
         )
         pairs = orientations.pairs(self.toolpath, rows)
         if len(pairs):
