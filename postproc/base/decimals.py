@@ -209,8 +209,7 @@ def fours(text: bytes) -> np.uint32:
 
 def text_of(columns: Sequence[Fours]) -> bytes:
     """The letters of the rows of columns (K,), one row after the other."""
-    every = np.stack(columns, axis=1).view(np.uint8).ravel()
-    return every.compress(every != 0).tobytes()
+    return np.stack(columns, axis=1).tobytes().translate(None, b"\0")
 
 
 def _count(letters: Fours) -> NDArray[np.uint8]:

@@ -71,7 +71,8 @@ class Correction:
 
     command: TCP commands in the robot base; q (N, 6): their motor angles; history (K + 1, N) [m]: predicted position
     error before and after each iteration, NaN once a motion is done; error (N,) [m] and angle (N,) [rad]: the last of
-    them; iterations (N,) used; reachable, settled, converged (N,).
+    them; turn (N, 3) [rad]: that angle as a rotation vector, base axes, with what cannot be corrected; iterations (N,)
+    used; reachable, settled, converged (N,).
     """
 
     command: Poses
@@ -79,6 +80,7 @@ class Correction:
     history: Floats
     error: Floats
     angle: Floats
+    turn: Floats
     iterations: Ints
     reachable: Bools
     settled: Bools
@@ -113,12 +115,13 @@ def mirror(
     reachable, settled, converged = np.ones(n, bool), np.ones(n, bool), np.zeros(n, bool)
     history: list[Floats] = []
     last = np.full(n, np.inf)
-    final = np.full((2, n), np.nan)
+    final, final_turn = np.full((2, n), np.nan), np.full((n, 3), np.nan)
     active = np.arange(n)
     for iteration in range(MAX_ITERATIONS + 1):
         some: Any = active if len(active) < n else slice(None)  # mostly all of them: nothing is copied
         here = predict(model, Poses(rotation[some], position[some]), case.part(some), displacement)
         shift, turn = pose_error(here.pose, goal[some])
+        final_turn[some] = turn
         if orientation_projection is not None:
             turn = (orientation_projection[some] @ turn[..., None])[..., 0]
         error, angle = lengths(shift), lengths(turn)
@@ -153,6 +156,7 @@ def mirror(
         np.array(history),
         final[0],
         final[1],
+        final_turn,
         iterations,
         reachable,
         settled,
