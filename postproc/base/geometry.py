@@ -309,9 +309,7 @@ def on_arc(
     def turn(angle: Floats) -> Floats:
         return np.asarray(np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * side + along)
 
-    return np.asarray(
-        centre + turn(share * sweep) + share[:, None] * (end - centre - turn(sweep))
-    )
+    return np.asarray(centre + turn(share * sweep) + share[:, None] * (end - centre - turn(sweep)))
 
 
 def arc_through(start: Floats, via: Floats, end: Floats) -> tuple[Floats, Floats, Floats]:
