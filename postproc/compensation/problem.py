@@ -346,7 +346,7 @@ class CompensationProblem:
         if not free.any():
             return turn
         axis = (goal.rotation @ free[..., None])[..., 0]
-        return turn - np.sum(turn * axis, axis=1, keepdims=True) * axis
+        return np.asarray(turn - np.sum(turn * axis, axis=1, keepdims=True) * axis)
 
     def steps(self, rows: Ints, corrected: Bools) -> Bools:
         """(K,) whether the correction of motions ``rows`` (K,) starts again, and does not go on from the one before:
