@@ -542,3 +542,9 @@ def test_rigid_tapping_leaves_the_tool_where_it_was() -> None:
     program = body("G33.1 Z-3. K1.\nG1 X6.\nG1 X7. Y0. Z1.\n")
     assert np.isnan(ends(program)[-2, 2])
     assert ends(program)[-1].tolist() == [7.0, 0.0, 1.0]
+
+
+def test_what_may_be_a_cycle_ends_nowhere_along_its_axis() -> None:
+    text = "G81 X1. R2. Z-1.\n/G1\nX-2. Y-3. Z3.\n"
+    assert np.isnan(ends(body(text))[-1, 2])
+    assert ends(body(text.replace("G81 X1. R2. Z-1.", "G0 X1.")))[-1].tolist() == [-2.0, -3.0, 3.0]
