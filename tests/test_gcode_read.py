@@ -548,3 +548,8 @@ def test_what_may_be_a_cycle_ends_nowhere_along_its_axis() -> None:
     text = "G81 X1. R2. Z-1.\n/G1\nX-2. Y-3. Z3.\n"
     assert np.isnan(ends(body(text))[-1, 2])
     assert ends(body(text.replace("G81 X1. R2. Z-1.", "G0 X1.")))[-1].tolist() == [-2.0, -3.0, 3.0]
+
+
+@pytest.mark.parametrize("before", ["G33.1 Z50. K1.\n", "G1 Z50.\nG10 L2 P0 Z5.\n"])
+def test_a_cycle_goes_back_to_no_level_that_is_not_the_tools(before: str) -> None:
+    assert np.isnan(ends(body(f"{before}G1 Y6.\nG98 G73 X2. R9. Z-3. Q1.\nG0 X1. Y1.\n"))[-1, 2])
