@@ -151,6 +151,15 @@ GCODE_LINES = (
     "G98 G81 X%d Y1 Z1 R2\n", "G81 X1 Z1 R2\nX1\nG80\n", "G81 X1 Z1 R2\nX%d\nX1\nX2\nX3\nX4\n",
     "G98 G18 G81 X1 Y1 R2\nG17\n", "G98 G81 X1 Z1 R2\nM8\nM9\n", "G98 G83 X1 Z1 R2 Q1\nG92 X1\n", "X%d U1\n",
 )  # fmt: skip
+GCODE_AROUND = {
+    "M98 P100\n": ("", "M2\nO100\nG1 X1\nM99\n"), "M98 P100 L2\n": ("", "M2\nO100\nG91 G1 X1\nM99\n"),
+    "G65 P100 A1\n": ("", "M2\nO100\nG1 X#1\nM99\n"),
+    "O100 CALL [1]\n": ("O100 SUB\nG1 X#1\nO100 ENDSUB\n", "M2\n"),
+    "G1 X#1\n": ("O1 REPEAT [9]\n#1=[#1+1]\n", "O1 ENDREPEAT\n"), "G10 L2 P1 X%d\nG1 X1\n": ("G55\n", ""),
+    "G1 X[#1+%d]\n": ("WHILE [#1 LT 9] DO1\n#1=[#1+1]\n", "END1\n"), "G1 X=R1+%d\n": ("R1=0\nLOOP\n", "ENDLOOP\n"),
+    "G43 H1\nX1\n": ("G10 L10 P1 Z5\n", ""), "D1\nTOFFL=2\nX1\n": ("", ""), "$P_PFRAME=CTRANS(X,%d)\nX1\n": ("", ""),
+}  # fmt: skip
+"""What comes again and again, and what is before and after it."""
 CONTROLS = {
     "linuxcnc": "G21 G90 G17 G54\nG1 X1 F100\n",
     "fanuc": "%\nO0001\nG21 G90 G17 G54\nG1 X1 F100\n",
@@ -261,6 +270,10 @@ def all_cases() -> list[Case]:
     ]
     for control, head in CONTROLS.items():
         found += _cases(control, head, GCODE, GCODE_LINES, "\n")
+        found += [
+            Case(control, f"between others {unit!r}", head + before, unit, after)
+            for unit, (before, after) in GCODE_AROUND.items()
+        ]
     found += _first("first.ngc", {start: (start, "!\n") for start in ("", *"XOG:%")}, "G1 X1\n")
     for kind, head in {"robot": ROBOT, "cell": CELL, "jobs": JOBS}.items():
         found += _cases(kind, head, YAML, YAML_LINES)

@@ -526,3 +526,30 @@ def test_u_v_w_at_0_move_nothing_before_one_that_is_not() -> None:
     path = read(head + "G1 X20 U1\nX30 Y0 Z5 U0\n").toolpath
     assert [*path.constraints.refused] == [2, 3]
     assert {finding.code for finding in path.constraints.refused.values()} == {"GCO016"}
+
+
+@pytest.mark.parametrize("level", ["L1", "L10", "L11"])
+def test_a_length_that_is_written_holds_from_the_next_g43(level: str) -> None:
+    text = f"G43 H1\nG0 Z10.\nG10 {level} P1 Z5.\nG1 X1.\nG43 H1\nX2.\nZ3.\nX4.\n"
+    height = ends(body(text))[-4:, 2]
+    assert np.isnan(height[1])
+    assert height[[0, 2, 3]].tolist() == [10.0, 3.0, 3.0]
+    assert np.isnan(ends(body("G43 H1\nG0 Z10.\nG10 L10 P1 R5.\nG1 X1.\n", "fanuc"))[-1, 2])
+    assert ends(body("G43 H1\nG0 Z10.\nG10 L2 P2 Z5.\nG43 H1\nG1 X1.\n"))[-1, 2] == 10.0
+
+
+def test_rigid_tapping_leaves_the_tool_where_it_was() -> None:
+    program = body("G33.1 Z-3. K1.\nG1 X6.\nG1 X7. Y0. Z1.\n")
+    assert np.isnan(ends(program)[-2, 2])
+    assert ends(program)[-1].tolist() == [7.0, 0.0, 1.0]
+
+
+def test_what_may_be_a_cycle_ends_nowhere_along_its_axis() -> None:
+    text = "G81 X1. R2. Z-1.\n/G1\nX-2. Y-3. Z3.\n"
+    assert np.isnan(ends(body(text))[-1, 2])
+    assert ends(body(text.replace("G81 X1. R2. Z-1.", "G0 X1.")))[-1].tolist() == [-2.0, -3.0, 3.0]
+
+
+@pytest.mark.parametrize("before", ["G33.1 Z50. K1.\n", "G1 Z50.\nG10 L2 P0 Z5.\n"])
+def test_a_cycle_goes_back_to_no_level_that_is_not_the_tools(before: str) -> None:
+    assert np.isnan(ends(body(f"{before}G1 Y6.\nG98 G73 X2. R9. Z-3. Q1.\nG0 X1. Y1.\n"))[-1, 2])

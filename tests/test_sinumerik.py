@@ -51,6 +51,54 @@ def test_g70_is_the_unit_of_coordinates_alone(code: str, unit: float) -> None:
     assert path.position[-1, 0] == pytest.approx((25.4 if "G70" in code and "G71" not in code else 1.0) * MM)
 
 
+def last(text: str) -> tuple[np.ndarray, int, str]:
+    """Where the last motion ends [mm], its base and why it is refused, after ``text`` behind a known place."""
+    raw = f"G90 G17 G54 G71 T1 D1\nG0 X0 Y0 Z5\nG1 Z-1 F100\n{text}\nM30\n".encode()
+    path = SINUMERIK.read((Document(Path("part.mpf"), raw),), DOWN).toolpath
+    row = len(path) - 1
+    refused = path.constraints.refused
+    return path.position[row] / MM, int(path.base[row]), refused[row].code if row in refused else ""
+
+
+@pytest.mark.parametrize("word", ["TOFFL=2", "TOFF[3]=2", "TCARR=1", "TOFFL=R1", "TOFFL=2\nZ1\nTOFFL=3"])
+def test_another_length_leaves_the_tool_elsewhere_along_its_axis(word: str) -> None:
+    place, _, code = last(f"{word}\nG1 X9")
+    assert np.isnan(place[2])
+    assert code == "GCO002"
+    place, _, code = last(f"{word}\nG1 X9 Z3")
+    assert place.tolist() == [9.0, 0.0, 3.0]
+    assert code == ""
+
+
+@pytest.mark.parametrize(
+    "name", ["$P_PFRAME", "$P_BFRAME", "$P_CHBFRAME[0]", "$P_ACTFRAME", "$P_UBFR", "$p_pframe"]
+)
+def test_a_frame_that_is_assigned_moves_the_coordinates(name: str) -> None:
+    place, base, code = last(f"{name}=CTRANS(X,1)\nG1 X1 Y2 Z3")
+    assert code in ("GCO014", "GCO019")
+    assert base < 0 or np.isnan(place).any()
+
+
+def test_the_programmed_frame_ends_with_trans() -> None:
+    place, base, code = last("$P_PFRAME=CTRANS(X,1)\nTRANS\nG1 X1 Y2 Z3")
+    assert (place.tolist(), base >= 0, code) == ([1.0, 2.0, 3.0], True, "")
+    assert last("$P_BFRAME=CTRANS(X,1)\nTRANS\nG1 X1 Y2 Z3")[1:] == (-1, "GCO014")
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("GEOAX()\nG1 X1 Y2 Z3", ""), ("GEOAX(3,W)\nG1 X1 Y2 Z3", "GCO010"),
+        ('TRAFOON("A")\nG1 X1 Y2 Z3', "GCO010"), ('TRAFOON("A")\nTRAFOOF\nG1 X1 Y2 Z3', ""),
+        ("TOFFON(Z,5)\nG1 X1 Y2 Z3", "GCO014"), ("LEADON(Y,X,1)\nG1 X1 Y2 Z3", "GCO014"),
+        ("ID=1 WHENEVER $A_IN[1]==1 DO $AA_OFF[Z]=1\nG1 X1 Y2 Z3", "GCO019"),
+        ("ID=1 WHENEVER $A_IN[1]==1 DO $A_OUT[1]=1\nG1 X1 Y2 Z3", ""),
+    ],
+)  # fmt: skip
+def test_what_takes_the_axes_elsewhere_is_reported(text: str, code: str) -> None:
+    assert last(text)[2] == code
+
+
 @pytest.mark.parametrize("path", BAD, ids=lambda path: f"{path.parent.parent.name}-{path.stem}")
 def test_a_bad_case_gives_the_codes_of_its_first_line(path: Path) -> None:
     found = program(path).findings

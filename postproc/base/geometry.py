@@ -303,9 +303,13 @@ def on_arc(
     in the last digit) in proportion.
     """
     radius = start - centre
-    turned = (rotation_from_vector((share * sweep)[:, None] * normal) @ radius[..., None])[..., 0]
-    last = (rotation_from_vector(sweep[:, None] * normal) @ radius[..., None])[..., 0]
-    return np.asarray(centre + turned + share[:, None] * (end - centre - last))
+    along = np.sum(radius * normal, axis=1)[:, None] * normal
+    across, side = radius - along, np.cross(normal, radius)
+
+    def turn(angle: Floats) -> Floats:
+        return np.asarray(np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * side + along)
+
+    return np.asarray(centre + turn(share * sweep) + share[:, None] * (end - centre - turn(sweep)))
 
 
 def arc_through(start: Floats, via: Floats, end: Floats) -> tuple[Floats, Floats, Floats]:

@@ -58,6 +58,8 @@ def fit_corners(
     if task.gain != 1.0:
         return result, division
     result, division = _fit_ramps(task, result, division, limits, least)
+    if np.isnan(task.toolpath.approximation).all():
+        return result, division
     motion = find_corners(task, result, division)
     if division.fits is not None:
         motion = np.setdiff1d(motion, division.fits.point)

@@ -143,9 +143,8 @@ def correct(task: CompensationProblem) -> CorrectionResult:
         corrections.history,
         tuple(findings),
     )
-    # What the mirror found holds for the whole correction, and where it corrects all that shows.
-    whole = task.gain == 1.0 and task.turn_freely(moved)
-    return result if whole else with_residual(task, result, result.command)
+    # What the mirror found holds for the whole correction.
+    return result if task.gain == 1.0 else with_residual(task, result, result.command)
 
 
 def _moved(wanted: Poses, shift: Floats, turn: Floats) -> Poses:
@@ -185,8 +184,8 @@ def with_residual(task: CompensationProblem, result: CorrectionResult, command: 
 class _CorrectedBlock(NamedTuple):
     """What a block of motions is found to do.  rows (K,): all that were predicted, with deflection (K, 3) [m], before
     (K,) [m] and before_angle [rad]; tried (T,): those of them that were corrected, by shift (T, 3) [m] and turn (T, 3)
-    [rad]; crossed (T,): to where the stated configuration means another full turn; other_quadrant (T,): than stated;
-    beyond (T,): the limits of an axis."""
+    [rad]; angle (T,) [rad]: what then shows on the part; crossed (T,): to where the stated configuration means another
+    full turn; other_quadrant (T,): than stated; beyond (T,): the limits of an axis."""
 
     rows: Ints
     deflection: Floats
@@ -196,6 +195,7 @@ class _CorrectedBlock(NamedTuple):
     shift: Floats
     turn: Floats
     done: Correction
+    angle: Floats
     crossed: Bools
     other_quadrant: Bools
     beyond: Bools
@@ -227,6 +227,7 @@ def _correct_block(task: CompensationProblem, rows: Ints, may: Bools) -> _Correc
         tried,
         *pose_error(done.command, wanted),
         done,
+        lengths(task.visible_turn(tried, goal[may], done.turn)),
         crossed,
         other_quadrant,
         ((done.q < low) | (done.q > high)).any(axis=1),
@@ -256,7 +257,7 @@ class _Findings:
         self.before_angle[rows] = block.before_angle
         self.tried[tried] = True
         self.shift[tried], self.turn[tried] = block.shift, block.turn
-        self.error[tried], self.angle[tried] = done.error, done.angle
+        self.error[tried], self.angle[tried] = done.error, block.angle
         # What the mirror starts with is a first step from the wanted pose.
         self.iterations[tried] = done.iterations + 1
         more = len(done.history) + 1 - len(self.history)

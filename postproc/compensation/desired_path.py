@@ -148,12 +148,12 @@ class DesiredPath:
     def tangent(self, rows: Ints, share: Floats) -> Floats:
         """(K, 3) unit vectors along the paths of ``rows`` (K,) at the shares (K,); zero where a motion only turns the
         tool."""
-        step = self.end[rows].position - self.start[rows].position
+        start, end = self.start[rows].position, self.end[rows].position
+        step = end - start
         arcs = np.flatnonzero(np.isfinite(self.sweep[rows]))
         if len(arcs):
-            at = rows[arcs]
-            here = self.at(at, share[arcs]).position
-            centre, normal, sweep = self.circles(at)
+            centre, normal, sweep = self.circles(rows[arcs])
+            here = on_arc(start[arcs], end[arcs], centre, normal, sweep, share[arcs])
             rise = np.sum(step[arcs] * normal, axis=1)[:, None]
             step[arcs] = sweep[:, None] * np.cross(normal, here - centre) + rise * normal
         length = np.linalg.norm(step, axis=1, keepdims=True)

@@ -71,7 +71,8 @@ class Correction:
 
     command: TCP commands in the robot base; q (N, 6): their motor angles; history (K + 1, N) [m]: predicted position
     error before and after each iteration, NaN once a motion is done; error (N,) [m] and angle (N,) [rad]: the last of
-    them; iterations (N,) used; reachable, settled, converged (N,).
+    them; turn (N, 3) [rad]: that angle as a rotation vector, base axes, with what cannot be corrected; iterations (N,)
+    used; reachable, settled, converged (N,).
     """
 
     command: Poses
@@ -79,6 +80,7 @@ class Correction:
     history: Floats
     error: Floats
     angle: Floats
+    turn: Floats
     iterations: Ints
     reachable: Bools
     settled: Bools
@@ -98,7 +100,8 @@ def mirror(
 
     ``orientation_projection`` (N, 3, 3): projection onto the rotation vectors that can be corrected (all of them
     without it); nothing else of the orientation is corrected, nor judged.  ``guess``: commands to start with instead of
-    ``wanted``, and displacements (N, m) [rad, m] to start their equilibria with; the result does not depend on them.
+    ``wanted``, turned from it as far as can be corrected, and displacements (N, m) [rad, m] to start their equilibria
+    with; the result does not depend on them.
 
     A motion stops when it is within tolerance, out of reach, without equilibrium, or when an iteration does not at
     least halve its error (it would not settle): ``converged`` states which, nothing diverges silently.
@@ -106,16 +109,19 @@ def mirror(
     n = len(wanted)
     first, displacement = (wanted, None) if guess is None else guess
     rotation, position = first.rotation.copy(), first.position.copy()
+    if guess is not None and orientation_projection is not None:
+        rotation = _turned_as_possible(wanted.rotation, rotation, orientation_projection)
     q, iterations = case.q_reference.copy(), np.zeros(n, np.int64)
     reachable, settled, converged = np.ones(n, bool), np.ones(n, bool), np.zeros(n, bool)
     history: list[Floats] = []
     last = np.full(n, np.inf)
-    final = np.full((2, n), np.nan)
+    final, final_turn = np.full((2, n), np.nan), np.full((n, 3), np.nan)
     active = np.arange(n)
     for iteration in range(MAX_ITERATIONS + 1):
         some: Any = active if len(active) < n else slice(None)  # mostly all of them: nothing is copied
         here = predict(model, Poses(rotation[some], position[some]), case.part(some), displacement)
         shift, turn = pose_error(here.pose, goal[some])
+        final_turn[some] = turn
         if orientation_projection is not None:
             turn = (orientation_projection[some] @ turn[..., None])[..., 0]
         error, angle = lengths(shift), lengths(turn)
@@ -150,11 +156,20 @@ def mirror(
         np.array(history),
         final[0],
         final[1],
+        final_turn,
         iterations,
         reachable,
         settled,
         converged,
     )
+
+
+def _turned_as_possible(wanted: Floats, guess: Floats, projection: Floats) -> Floats:
+    """``wanted`` (N, 3, 3), turned to ``guess`` (N, 3, 3) by what the projections (N, 3, 3) leave of that turn."""
+    if not projection.any():
+        return wanted.copy()
+    turn = (projection @ turn_between(wanted, guess)[..., None])[..., 0]
+    return product(rotation_from_vector(turn), wanted)
 
 
 def initial_guess(

@@ -30,7 +30,7 @@ ON_RAMPS = (0.125, 0.375, 0.625, 0.875)
 """And where besides on motions on which a ramp of the force lies: there it is largest anywhere."""
 
 SHORT, LITTLE = 30 * MM, 3 * DEG
-"""Of a segment that is shorter and turns by less the middle is enough."""
+"""Of a segment that is shorter and turns by less, along an arc or in place, the middle is enough."""
 
 TURNED = 0.02
 """Share of the tolerance: a turn of the wanted orientation, where the tool is early or late, that is not looked at."""
@@ -147,7 +147,7 @@ def path_errors(
     """
     length = lengths(segments.end.position - segments.start.position)
     _, turn = pose_error(segments.end, segments.start)
-    long = (length > SHORT) | (lengths(turn) > LITTLE) | np.isfinite(segments.sweep)
+    long = (length > SHORT) | (lengths(turn) > LITTLE) | (segments.sweep > LITTLE)
     if task.external is not None:
         long |= task.external.moves(segments.rows)
     off, angle = np.zeros(len(segments)), np.zeros(len(segments))

@@ -205,7 +205,7 @@ class CompensationProblem:
         """The commands (K) that bring the tool to ``goal`` (K) in motions ``rows`` (K,) under ``wrench`` (K, 6) [N, N
         m], at ``share`` (K,) of their paths or at their ends.  ``start``: poses (K) and displacements (K, m) [rad, m]
         as ``start_command`` gives them, where they are known."""
-        if start is None and self.turn_freely(rows):
+        if start is None:
             start = self.start_command(rows, wanted, wrench, goal, share=share)
         placed = self.robot_from_path(rows, share)
         if placed is not None:
@@ -218,12 +218,15 @@ class CompensationProblem:
             goal,
             self._load_case(rows, wrench, self._to_be(rows, share), share),
             turns,
-            start if turns is None else None,
+            start,
         )
         pairs = orientations.pairs(self.toolpath, rows)
         if len(pairs):
             done = self._in_words(rows, goal, wrench, share, done, pairs)
-        return done if placed is None else replace(done, command=placed.inverse() @ done.command)
+        if placed is None:
+            return done
+        back = placed.inverse()
+        return replace(done, command=back @ done.command, turn=turned(back.rotation, done.turn))
 
     def _in_words(
         self, rows: Ints, goal: Poses, wrench: Floats, share: Floats | None, done: Correction, pairs: Ints
@@ -249,7 +252,7 @@ class CompensationProblem:
         )
         command, parts = done.command.copy(), {}
         command.put(pairs, again.command)
-        for name in ("q", "error", "reachable", "settled", "converged"):
+        for name in ("q", "error", "turn", "reachable", "settled", "converged"):
             values, new = getattr(done, name).copy(), getattr(again, name)
             values[pairs] = values[pairs] & new if new.dtype == np.bool_ else new
             parts[name] = values
@@ -335,11 +338,15 @@ class CompensationProblem:
         """real (-) goal, (K, 3) [m] and (K, 3) [rad], of motions ``rows`` (K,) as it shows on the part: a turn about a
         free axis does not."""
         shift, turn = pose_error(real, goal)
+        return shift, self.visible_turn(rows, goal, turn)
+
+    def visible_turn(self, rows: Ints, goal: Poses, turn: Floats) -> Floats:
+        """(K, 3) [rad] of ``turn`` (K, 3) against ``goal`` (K), in motions ``rows`` (K,), what shows on the part."""
         free = np.nan_to_num(self.toolpath.orientation_control.redundant_axis[rows])
         if not free.any():
-            return shift, turn
+            return turn
         axis = (goal.rotation @ free[..., None])[..., 0]
-        return shift, turn - np.sum(turn * axis, axis=1, keepdims=True) * axis
+        return np.asarray(turn - np.sum(turn * axis, axis=1, keepdims=True) * axis)
 
     def steps(self, rows: Ints, corrected: Bools) -> Bools:
         """(K,) whether the correction of motions ``rows`` (K,) starts again, and does not go on from the one before:

@@ -22,6 +22,9 @@ MOST = 5_000_000
 LITTLE = 3 * DEG
 """Axes that turn by less do not change a robot's compliance: what changes with its square is a thousandth."""
 
+WIDE = 30 * DEG
+"""An arc that turns further is evaluated between its points, whatever its correction."""
+
 _ORDER = {False: 2.0, True: 3.0}
 """The error between points of a straight segment falls with the square of its length, that of an arc through three
 points with the third power at least; where to look first for the number that is enough."""
@@ -86,15 +89,22 @@ def _refuse_too_many(motions: DivisibleMotions) -> None:
 
 
 def _even_motions(motions: DivisibleMotions) -> Bools:
-    """(I,) straight paths on which the correction hardly changes and the axes hardly turn: it lies on a line from
-    start to end, and between them nothing is off by more than a part of that change."""
+    """(I,) paths on which the correction hardly changes and the axes hardly turn: it lies on a line from start to end,
+    and between them nothing is off by more than a part of that change.
+
+    With an arc the force may turn by its sweep: a correction c that turns with it lies c sweep^2 / 8 beside that line.
+    """
     task, full, path = motions.task, motions.full, motions.task.toolpath
 
     def even(part: slice) -> Bools:
         rows = motions.rows[part]
         before = np.maximum(rows - 1, 0)
         alike = full.corrected[before] & (rows > 0) & (motions.start_at[part] < 0)
-        alike &= ~task.desired_path.arc[rows] & (path.tool[rows] == path.tool[before])
+        alike &= path.tool[rows] == path.tool[before]
+        at = np.flatnonzero(task.desired_path.arc[rows])
+        sweep, size = task.desired_path.sweep[rows[at]], lengths(full.correction[rows[at]])
+        alike[at] &= (size * sweep**2 / 8 <= STEP * task.tolerance) & (sweep <= WIDE)
+        alike[at] &= ~path.arcs.turns_along[rows[at]]
         if task.external is not None:
             alike &= ~task.external.moves(rows)
         for change, most in ((full.correction, task.tolerance), (full.turn, task.tolerance_angle)):

@@ -34,6 +34,7 @@ class Scope:
     def __init__(self, shared: dict[str, float | None] | None = None) -> None:
         self.shared: dict[str, float | None] = {} if shared is None else shared
         self.own: dict[str, float | None] = {}
+        self.system = {name for name, value in self.shared.items() if value is None}
 
     def _of(self, name: str) -> dict[str, float | None]:
         return self.shared if name.startswith("<_") or (name.isdigit() and int(name) > 30) else self.own
@@ -184,7 +185,7 @@ class Expressions:
             one, two = (self.number(chance.uniform(1, 9)) for _ in range(2))
             value = math.degrees(math.atan2(one.value or 0.0, two.value or 0.0))
             return f"{self.case('ATAN')}[{one.text}]/[{two.text}]", value, 5
-        named = [name for name in scope.names if name.startswith("<")]
+        named = [name for name in scope.names if name.startswith("<") and name not in scope.system]
         if named and chance.random() < 0.1:
             return f"{self.case('EXISTS')}[#{chance.choice(named)}]", 1.0, 5
         name = chance.choice(sorted(_FUNCTIONS))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from .expressions import Scope
+from .expressions import Real, Scope
 from .settings import Settings
 from .spelling import Modes
 
@@ -127,6 +127,8 @@ class Flow(Settings):
         """A subprogram; what is in force at its end is what a call leaves, None if it states nothing."""
         self.flush()
         label = self.next_label()
+        if self.late and self.has("called") and label[1:].isdigit():
+            return self.called_by_number(label)
         arguments = self.chance.randint(0, 3)
         modes, self.modes = self.modes, self.modes.copy()
         scope, self.scope = self.scope, Scope(self.scope.shared)
@@ -147,11 +149,27 @@ class Flow(Settings):
         self.modes, self.scope = modes, scope
         self.scope.forget()
 
+    def called_by_number(self, label: str) -> None:
+        """A subprogram from its O to M99, which M98 calls."""
+        modes, self.modes = self.modes, self.modes.copy()
+        scope, self.scope = self.scope, Scope(self.scope.shared)
+        self.flow_line(label)
+        self.modes.fed = False
+        self.body(self.chance.randint(1, 5), True)
+        self.put(self.key("m99"), plain=True)
+        self.subs.append((label, -1, self.modes.copy()))
+        self.modes, self.scope = modes, scope
+        self.scope.forget()
+
     def call(self) -> None:
         if not self.subs:
             return self.line()
         self.flush()
         label, count, _ = self.chance.choice(self.subs)
+        if count < 0:
+            times = [self.word("L", Real(str(self.chance.randint(1, 3)), None))] if self.maybe(0.4) else []
+            self.put(self.key("m98"), self.word("P", Real(label[1:], None)), *times, plain=True)
+            return self.after(self.modes.copy())
         arguments = [
             f"[{self.reals.real(self.chance.uniform(-20, 20), self.scope).text}]" for _ in range(count)
         ]
@@ -205,6 +223,8 @@ class Flow(Settings):
             (self.tool, 1.5 * self.has("tools")),
             (self.tool_length, 2 * self.has("lengths")),
             (self.cycles, 3 * self.has("cycles")),
+            (self.thread, 1.5 * self.has("threads")),
+            (self.polar, 1.5 * self.has("polar")),
             (self.assign, 3 * self.has("parameters")),
             (self.flow, 2 * self.has("flow")),
             (self.call, 3 * bool(self.subs and self.depth < 2)),

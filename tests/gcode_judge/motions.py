@@ -53,6 +53,8 @@ class Motions(Spelling):
             words.insert(0, self.code(code))
         modes.motion = code
         words += self.targets(self.place(), which)
+        if self.has("dwells") and self.maybe(0.15):
+            words += [self.code("4"), self.word("P", Real("0.1", None))]
         if self.has("rotary") and self.maybe(0.25):
             words.append(self.length(self.chance.choice("AABC"), self.chance.uniform(-90, 90))[0])
         self.put(*words)
@@ -76,6 +78,8 @@ class Motions(Spelling):
         start = [value or 0.0 for value in modes.here]
         radius = chance.uniform(0.05, 0.5) * self.size
         angle, sweep = chance.uniform(0, 2 * math.pi), chance.uniform(0.3, 5.5)
+        if self.maybe(0.2):
+            angle = 0.5 * math.pi * chance.randint(0, 3)
         code = chance.choice("23")
         words = self.feed()
         if not (modes.motion == code and self.maybe(0.4)):
@@ -95,6 +99,8 @@ class Motions(Spelling):
             centre = list(start)
             for axis, by in ((u, radius * math.cos(angle)), (v, radius * math.sin(angle))):
                 base = 0.0 if modes.absolute_centres else start[axis]
+                if not modes.absolute_centres and abs(by) < 1e-9 and self.maybe(0.7):
+                    continue
                 real = self.reals.number(start[axis] + by - base, 4)
                 words.append(self.word("IJK"[axis], real))
                 centre[axis] = base + (real.value or 0.0)
@@ -118,11 +124,38 @@ class Motions(Spelling):
             here = modes.here[axis]
             base = (here or 0.0) if modes.incremental else 0.0
             rich, self.reals.rich = self.reals.rich, self.reals.rich and self.maybe(0.3)
-            word, value = self.length("XYZ"[axis], end[axis] - base, 4)
+            decimals = 4 if modes.inch else self.chance.choice((3, 4, 4))
+            word, value = self.length("XYZ"[axis], end[axis] - base, decimals)
             self.reals.rich = rich
             words.append(word)
             modes.here[axis] = None if value is None or (modes.incremental and here is None) else base + value
         return words
+
+    def polar(self) -> None:
+        """A straight motion to polar coordinates."""
+        self.flush()
+        self.modes.motion = "1"
+        words = [self.word("@", self.reals.number(self.chance.uniform(0.1, 1) * self.size, 2))]
+        if self.maybe(0.7):
+            words.append(self.word("^", self.reals.number(self.chance.uniform(-90, 90), 1)))
+        self.put(self.code("1"), *self.feed(), *words)
+        self.modes.lost()
+
+    def thread(self) -> None:
+        """A motion with the turns of the spindle; after rigid tapping the tool is where it was."""
+        self.flush()
+        if self.modes.timed:
+            return self.line()
+        if not self.modes.spindle:
+            self.start_spindle()
+        code = self.chance.choice(("33", "33.1"))
+        axes = [2] if code == "33.1" else [2, *self.chance.sample([0, 1], self.chance.randint(0, 2))]
+        self.put(
+            self.code(code), *self.targets(self.place(), axes), self.word("K", self.reals.number(1.5, 2))
+        )
+        self.modes.motion = ""
+        if code == "33.1":
+            self.modes.lost()
 
     def start_spindle(self) -> None:
         self.flush()

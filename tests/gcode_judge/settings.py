@@ -37,7 +37,8 @@ class Settings(Motions):
             return
         elif code == "64 P":
             self.flush()
-            self.put(self.code("64"), self.word("P", self.reals.number(0.05, 2)))
+            fine = [self.word("Q", self.reals.number(0.02, 2))] if self.maybe(0.3) else []
+            self.put(self.code("64"), self.word("P", self.reals.number(0.05, 2)), *fine)
             return
         self.join(code)
 
@@ -61,12 +62,25 @@ class Settings(Motions):
 
     def setting(self) -> None:
         self.flush()
+        if self.has("tables") and self.maybe(0.4):
+            return self.table()
+        if self.has("system") and self.maybe(0.3):
+            return self.put(
+                f"#{5221 + 20 * self.chance.randint(0, 8) + self.chance.randint(0, 2)}={self.chance.randint(-9, 9)}"
+            )
         level = self.chance.choice(("2", "2", "20"))
         words = [self.code("10"), self.word("L", Real(level, None))]
         words += [self.word("P", Real(str(self.chance.randint(0, 9)), None)), *self.some()]
         if level == "2" and self.has("rotation") and self.maybe(0.5):
             words.append(self.word("R", self.reals.number(self.chance.uniform(-90, 90))))
         self.put(*words)
+        self.modes.lost()
+
+    def table(self) -> None:
+        """Lengths of tools in the control's table."""
+        words = [self.code("10"), self.word("L", Real(self.chance.choice(("1", "10", "11")), None))]
+        words.append(self.word("P", Real(str(self.chance.randint(1, TOOLS)), None)))
+        self.put(*words, self.length("Z", self.chance.uniform(0, 0.3) * self.size)[0])
         self.modes.lost()
 
     def shift(self) -> None:
@@ -86,6 +100,8 @@ class Settings(Motions):
 
     def home(self) -> None:
         self.flush()
+        if self.maybe(0.2):
+            return self.put(self.code(self.chance.choice(("28.1", "30.1"))))
         self.put(self.code(self.chance.choice(("28", "30"))), *(self.some() if self.maybe(0.7) else []))
         self.modes.lost()
 

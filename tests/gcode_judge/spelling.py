@@ -42,11 +42,17 @@ FEATURES = {
     "saved": 0.1,
     "unordered": 0.6,
     "sparse": 0.7,
+    "tables": 0.1,
+    "system": 0.1,
+    "threads": 0.1,
+    "polar": 0.06,
+    "dwells": 0.1,
+    "called": 0.5,
 }
 """Feature -> the share of programs that have it."""
 PLAIN = 0.35
 """The share of programs without any of these."""
-COMPUTED = {"parameters", "rich", "flow", "subs", "slash"}
+COMPUTED = {"parameters", "rich", "flow", "subs", "slash", "system"}
 PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 OFFSETS = ("54", "55", "56", "57", "58", "59", "59.1", "59.2", "59.3")
 GROUPS = (
@@ -54,6 +60,21 @@ GROUPS = (
 )  # fmt: skip
 """Modal groups, of which a block has one code."""
 NAMES = ("1", "2", "5", "30", "31", "100", "<a>", "<depth>", "<x_1>", "<_g>", "<_Top>")
+SYSTEM = (
+    "5420",
+    "5421",
+    "5422",
+    "5220",
+    "5221",
+    "5241",
+    "5211",
+    "5403",
+    "<_x>",
+    "<_z>",
+    "<_metric>",
+    "<_coord_system>",
+)
+"""Parameters that the control sets itself; the generator follows none of them."""
 TOOLS = 4
 
 
@@ -92,11 +113,12 @@ class Spelling:
         self.reals = Expressions(self.chance, "rich" in self.features, "loose" in self.features)
         self.blocks: list[Block] = []
         self.modes = Modes()
-        self.scope = Scope()
+        self.scope = Scope(dict.fromkeys(SYSTEM if "system" in self.features else ()))
         self.pending: list[str] = []
         self.groups: list[tuple[str, ...] | str] = []
         self.label = self.chance.randint(1, 900)
         self.subs: list[tuple[str, int, Modes | None]] = []
+        self.late = False
         self.depth = 0
         self.bound = self.chance.choice((8, 15, 25, 40, 58))
 

@@ -293,6 +293,10 @@ def tilted(given: BlockWords) -> Bools:
     )
 
 
+CYCLES = (73.0, *(float(code) for code in range(81, 90)))
+"""Codes of the canned cycles of ISO controls."""
+
+
 def frame_events(
     given: BlockWords, spoiled: Bools, away: Bools, ends: Floats, lengths: Bools, reasons: Reasons
 ) -> Course:
@@ -354,6 +358,9 @@ def frame_events(
         lose(deep, cycle & ~at_level, What.CYCLE)
         lose(linear, cycle & (force[Group.PLANE] < 0), What.CYCLE)
         lose(whole, cycle & repeats & (force[Group.DISTANCE] != 0), What.CYCLE)
+    if (move < 0).any() and np.isin(given.source.column(key("G")).value, CYCLES).any():
+        # perhaps a cycle, which ends elsewhere along the axis in which it works
+        lose(linear, given.motion & (move < 0), What.CYCLE)
     lose(present, given.motion & (flow.reason != FlowReason.NONE), What.UNCERTAIN)
     lose(whole, given.noted("unknown"), What.TEXT)
     if (called := given.noted("cycle")).any():

@@ -32,7 +32,7 @@ _COMMON = _codes(
     (Group.MOTION, Move.LINE, (1,)),
     (Group.MOTION, Move.CLOCKWISE, (2,)),
     (Group.MOTION, Move.COUNTER, (3,)),
-    (Group.MOTION, Move.THREAD, (33, 33.1, 34)),
+    (Group.MOTION, Move.THREAD, (33, 34)),
     (Group.MOTION, Move.CYCLE, (73, 74, 76, 81, 82, 83, 84, 85, 86, 87, 88, 89)),
     (Group.MOTION, Move.NOTHING, (80,)),
     (Group.PLANE, 0, (17,)),
@@ -117,7 +117,7 @@ LINUXCNC = Control(
         **_COMMON,
         **_codes(
             (Group.MOTION, Move.SPLINE, (5, 5.1, 5.2, 5.3)),
-            (Group.MOTION, Move.OTHER, (12, 13, 70, 71, 71.1, 71.2, 72, 72.1, 72.2)),
+            (Group.MOTION, Move.OTHER, (12, 13, 33.1, 70, 71, 71.1, 71.2, 72, 72.1, 72.2)),
             (Group.DIAMETER, 1, (7,)),
             (Group.DIAMETER, 0, (8,)),
             (Group.PLANE, -1, (17.1, 18.1, 19.1)),

@@ -38,7 +38,8 @@ def leaves_unknown(given: BlockWords, lengths: Bools) -> Bools:
         modal.has(*once) | modal.unknown | modal.unused | given.noted("unknown", "axis", "polar", "corner")
     )
     uncertain = modal.flow.forget | (modal.flow.reason != 0) | modal.switched(Group.OFFSET) | lengths
-    return np.asarray(others | uncertain | given.twice)
+    elsewhere = given.motion & ((given.move == Move.OTHER) | (given.move < 0))
+    return np.asarray(others | uncertain | given.twice | elsewhere)
 
 
 def _named_ends(given: BlockWords, retract: int) -> CycleEnds:
@@ -89,6 +90,7 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
     # Where the last coordinate of each axis is stated; words of a cycle along its own axis are depths.
     certain = given.modal.flow.reason == 0
     sure = given.motion & ~given.machine & absolute & certain
+    sure &= (given.move != Move.OTHER) & (given.move >= 0)  # these may end elsewhere
     placed = sure[:, None] & np.isin(hows, (How.NUMBER, How.INTEGER))
     placed &= ~(cycle[:, None] & (axis[:, None] == np.arange(3)))
     frame = np.searchsorted(events, np.arange(n))

@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 LONGEST = 400
 """Characters of an expression; a longer one is not evaluated."""
@@ -164,8 +165,7 @@ def evaluate(text: str, language: ExpressionLanguage, lookup: Lookup) -> float:
     """The value of an expression, NaN where it is not known or not finite."""
     if len(text) > LONGEST:
         return math.nan
-    text = text.strip().upper()
-    tokens = _tokens(text.translate(_BLANKS) if language.numbered else text, _TOKENS[language.numbered])
+    tokens = _tokens(text, language.numbered)
     if not tokens:
         return math.nan
     try:
@@ -175,24 +175,31 @@ def evaluate(text: str, language: ExpressionLanguage, lookup: Lookup) -> float:
     return value if end == len(tokens) and math.isfinite(value) else math.nan
 
 
-def _tokens(text: str, pattern: re.Pattern[str]) -> list[tuple[str, str]]:
-    """Kind and text of every token; none where a part of the text is no token."""
+@lru_cache(maxsize=1024)
+def _tokens(text: str, numbered: bool) -> tuple[tuple[str, str], ...]:
+    """Kind and text of every token; none where a part of the text is no token.  The same text comes again in each pass
+    of a loop."""
+    pattern, text = _TOKENS[numbered], text.strip().upper()
+    if numbered:
+        text = text.translate(_BLANKS)
     found, at = [], 0
     while at < len(text):
         token = pattern.match(text, at)
         if token is None:
-            return []
+            return ()
         kind = token.lastgroup or ""
         if kind != "blank":
             found.append((kind, token[kind]))
         at = token.end()
-    return found
+    return tuple(found)
 
 
 class _ExpressionParser:
     """Precedence climbing; every method gives a value and the token after it.  Raises ValueError on other text."""
 
-    def __init__(self, tokens: list[tuple[str, str]], language: ExpressionLanguage, lookup: Lookup) -> None:
+    def __init__(
+        self, tokens: tuple[tuple[str, str], ...], language: ExpressionLanguage, lookup: Lookup
+    ) -> None:
         self._tokens, self._language, self._lookup = tokens, language, lookup
 
     def _at(self, at: int) -> str:

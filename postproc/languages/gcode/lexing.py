@@ -37,11 +37,11 @@ for _bytes, _class in (
     (b"=", _EQUALS),
 ):
     _CLASS[list(_bytes)] = _class
+_CLASSES = _CLASS.tobytes()
 
 Bytes = NDArray[np.uint8]
 
-_UNTAPED = np.arange(256, dtype=np.uint8)
-_UNTAPED[[0, 2, 3, 4, 17, 18, 19, 20, 26]] = 32
+_UNTAPED = bytes(32 if byte in (0, 2, 3, 4, 17, 18, 19, 20, 26) else byte for byte in range(256))
 """What tapes and serial lines leave between the characters states nothing."""
 
 
@@ -54,10 +54,10 @@ def lex(raw: bytes, control: Control, start: int = 0, end: int | None = None, li
     letters = np.frombuffer(raw, np.uint8)[start:end]
     feeds = np.flatnonzero(letters == 10)
     comments = _comments(raw, control.comment, start, end)
-    blanked = _blanked(letters, comments, start == 0 and raw.startswith(BOM_UTF8))
-    plain, odd, ends = _plain(letters, _CLASS[blanked], control.parameter)
+    clean = _blanked(raw[start:end], comments, start == 0 and raw.startswith(BOM_UTF8))
+    kinds = np.frombuffer(clean.translate(_CLASSES), np.uint8)
+    plain, odd, ends = _plain(letters, kinds, control.parameter)
     starts = np.concatenate([[0], ends[:-1] + 1])
-    clean = blanked.tobytes()
     other = _taken([clean[starts[i] : ends[i]] for i in odd], np.array(odd, dtype=np.int64), starts, control)
     words, blocks, notes = _joined(feeds, plain, other, starts, ends)
     if start:
@@ -79,17 +79,20 @@ def _comments(raw: bytes, pattern: bytes, start: int, end: int) -> Ints:
     return np.array(spans, dtype=np.int64).reshape(-1, 3) - start
 
 
-def _blanked(letters: Bytes, comments: Ints, marked: bool) -> Bytes:
-    """The bytes with blanks in the place of comments and of the byte order mark."""
-    blanked = _UNTAPED[letters]
+def _blanked(text: bytes, comments: Ints, marked: bool) -> bytes:
+    """The text with blanks in the place of comments and of the byte order mark."""
+    clean = text.translate(_UNTAPED)
+    if not marked and not len(comments):
+        return clean
+    blanked = np.frombuffer(bytearray(clean), np.uint8)
     if marked:
         blanked[: len(BOM_UTF8)] = 32
     if len(comments):
-        edge = np.zeros(len(letters) + 1, np.int8)
+        edge = np.zeros(len(clean) + 1, np.int8)
         edge[comments[:, 0]] += 1
         edge[comments[:, 1]] -= 1
         blanked[np.cumsum(edge[:-1], dtype=np.int8) > 0] = 32
-    return blanked
+    return blanked.tobytes()
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,12 +136,12 @@ def _plain(letters: Bytes, kinds: Bytes, parameter: str) -> tuple[_Plain, list[i
     equal = np.flatnonzero(kind == _EQUALS)
     if len(equal):
         before, two = np.maximum(equal - 1, 0), np.maximum(equal - 2, 0)
-        named = (kind[before] == _LETTER) & (equal > 0)
+        lettered = (kind[before] == _LETTER) & (equal > 0)
         one = place[two] + 1 == place[before]
         alone = np.append(run_stop, -1)[run[before]] == place[before] + 1
         digit = kinds[np.minimum(place[before], size - 1)] == _DIGIT
         indexed = (kind[before] == _DIGIT) & (kind[two] == _LETTER) & (equal > 1) & one & alone & digit
-        fine = (named | indexed) & (kind[equal + 1] == _DIGIT)
+        fine = (lettered | indexed) & (kind[equal + 1] == _DIGIT)
         bad[equal[~fine]] = True
         dropped[equal] = True
         numbered = equal[indexed & fine]
@@ -159,9 +162,10 @@ def _plain(letters: Bytes, kinds: Bytes, parameter: str) -> tuple[_Plain, list[i
     is_odd[line[bad & ~new]] = True
     odd = np.flatnonzero(is_odd)
 
-    first = kept[:-1][(this == _LETTER) & ~is_odd[line[kept[:-1]]]]
-    position = np.searchsorted(kept, first)
-    runs = run[kept[position + 1]]
+    named = np.flatnonzero(this == _LETTER)
+    if len(odd):
+        named = named[~is_odd[line[kept[named]]]]
+    first, runs = kept[named], run[kept[named + 1]]
     start, stop = run_start[runs], run_stop[runs]
     upper = letters[place[first]].astype(np.int64) & 0xDF
     value, _ = literals(letters, start, stop, _long)

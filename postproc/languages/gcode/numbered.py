@@ -18,10 +18,14 @@ from postproc.languages.gcode.words import key
 from postproc.toolpath import FrameRef
 
 TOOL_CHANGE = 6
+OFFSET_LEVELS = (2.0, 20.0)
+"""L of a G10 that writes work offsets."""
 LENGTH_CODES = (43.0, 43.4, 43.5, 234.0)
 SYSTEM = ((5201, 5400), (7001, 7999), (14001, 20000))
 """Variables that are work offsets: of Fanuc and Haas (7001, 14001: G54.1 Pn), 5211 to 5400 of LinuxCNC."""
 
+_BASE_FRAME = re.compile(r"\$P_(?:(?!PFRAME)[A-Z]*FRAME|UBFR|CHBFR|NCBFR)(?![A-Z])", re.I)
+"""Variables of a Sinumerik that move all work offsets; $P_UIFR is one of these, $P_PFRAME the programmed frame."""
 _TARGET = re.compile(r"#[ \t]*+(\d++|<)?")
 
 
@@ -150,6 +154,8 @@ def _offset_events(given: BlockWords) -> list[tuple[int, int | None, Floats | No
 
 def _is_offset(assignment: str) -> bool:
     """Whether an assignment may write a work offset: to a variable that is one, or to one that is computed."""
+    if _BASE_FRAME.match(assignment):
+        return True
     target = _TARGET.match(assignment)
     if target is None or target[1] is None:
         return target is not None
@@ -189,8 +195,8 @@ class ToolLengths:
 
 
 def tool_lengths(given: BlockWords, tool: Ints) -> ToolLengths:
-    """Where a program changes the length of its tool: G43 with another number H or another ``tool`` (B,), G49, a word D
-    of a control with such offsets, M6."""
+    """Where a program changes the length of its tool: G43 with another number H or another ``tool`` (B,), or after a
+    G10 that writes lengths; G49, a word D of a control with such offsets, M6."""
     n, force = len(given), given.modal.force[Group.LENGTH]
     changes, off = switched(force, given.modal.ahead[Group.LENGTH]).copy(), force == 0
     if (force == 1).any():
@@ -204,6 +210,13 @@ def tool_lengths(given: BlockWords, tool: Ints) -> ToolLengths:
         # Stated again in the other unit, LinuxCNC moves the coordinates by the length in both.
         units = given.modal.force[Group.UNITS][at]
         changes[at[1:][(number[1:] != number[:-1]) | (units[1:] != units[:-1])]] = True
+        written = np.flatnonzero(
+            given.modal.has(Once.SETTING) & ~np.isin(given.number(key("L")), OFFSET_LEVELS)
+        )
+        if len(written):
+            changes[at[at > written[0]]] = True
+            # Fanuc takes a new length at once, LinuxCNC with the next G43
+            changes[written] |= given.control.increments
         off &= np.maximum.accumulate(force == 1)
     else:
         off = everywhere(False, n)
@@ -214,6 +227,7 @@ def tool_lengths(given: BlockWords, tool: Ints) -> ToolLengths:
         edge = given.words(given.control.offsets)
         chosen = fill_modal(n, edge.block, np.nan_to_num(edge.value, nan=-1.0).astype(np.int32), 1, np.int32)
         changes |= switched(chosen, 1)
+        changes[edge.block[np.isnan(edge.value)]] = True
         off = off | (chosen == 0)
     return ToolLengths(changes, off)
 

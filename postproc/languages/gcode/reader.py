@@ -261,7 +261,7 @@ def _followed(
     )
     allowed = blend_tolerances(given)
     lengths = tool_lengths(given, tool)
-    ends = cycle_ends(given, events, lengths.changes)
+    ends = cycle_ends(given, events, lengths.changes | offset.changed)
     drills = drill_cycles(given, events, offset.changed, lengths.changes)
     found, differing = FilledRows(len(rows)), 0
     for start in range(0, max(len(given), 1), PART):

@@ -7,7 +7,6 @@ from bisect import bisect_left
 
 from postproc.languages.gcode.run_calls import RunCalls
 from postproc.languages.gcode.statements import Construct, FlowStatement, NotFollowed, Verb
-from postproc.languages.gcode.words import key
 
 
 class RunFlow(RunCalls):
@@ -69,7 +68,7 @@ class RunFlow(RunCalls):
         if verb == "end":
             return self.leave() if self.frames and self.control.calls else None
         if verb == "return":
-            if self.source.mask(key("P"))[block] if self.frames else False:
+            if self.frames and self.last_word(block, "P") >= 0:
                 raise NotFollowed
             return self.leave() if self.frames else None
         if verb is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 
 import numpy as np
@@ -178,7 +178,17 @@ class RunState:
     def word(self, block: int, letter: str) -> float:
         """The value of a word of a block that runs now, NaN without."""
         address = key(letter)
-        for step, one, _, value, _ in reversed(self.rows[-20:]):
-            if step == self.count - 1 and one == address:
+        for step, one, _, value, _ in reversed(self.rows):  # in the order of their steps
+            if step != self.count - 1:
+                break
+            if one == address:
                 return value
-        return float(self.source.column(address).last(np.array([block]))[0])
+        column = self.source.column(address)
+        at = self.last_word(block, letter)
+        return float(column.value[at]) if at >= 0 else math.nan
+
+    def last_word(self, block: int, letter: str) -> int:
+        """The place of the last word of a block in the column of its letter, -1 without one."""
+        column = self.source.column(key(letter)).block
+        at = bisect_right(column, block) - 1
+        return at if at >= 0 and column[at] == block else -1

@@ -33,6 +33,9 @@ SETTINGS = frozenset(
 )
 """Addresses that say nothing of where a motion goes."""
 
+LENGTHS = frozenset(b"TOFF TOFFL TOFFR TOFFLR TCARR".split())
+"""Addresses that change the length of the tool, as another D does."""
+
 DRILLING = frozenset(f"CYCLE{number}".encode() for number in range(81, 90))
 """Cycles that end in their retraction plane, above where they start."""
 MILLING = frozenset(
@@ -45,8 +48,8 @@ MILLING = frozenset(
 QUIET_CALLS = frozenset(
     b"MSG CYCLE832 FGROUP SETMS SETAL BRISKA SOFTA DRIVEA JERKA WORKPIECE GROUP_BEGIN GROUP_END GROUP_ADDEND WAITM "
     b"WAITMC WAITE WAITS WAITP INIT START CLEARM SETM CLEAR DISPLOF DISPLON SETINT DISABLE ENABLE CLRINT FPO FENDNORM "
-    b"SPCON SPCOF WRITE DELETE STRINGIS PUTFTOCF PROTD IPTRLOCK IPTRUNLOCK STOPRE TCARR TOFFON TOFFOF CTOL FCTDEF "
-    b"RELEASE GET GETD AXTOCHAN CYCLE_HSC EXTERN MMC COUPDEF TANGDEF LEADON".split()
+    b"SPCON SPCOF WRITE DELETE STRINGIS PROTD IPTRLOCK IPTRUNLOCK STOPRE CTOL FCTDEF "
+    b"RELEASE GET GETD AXTOCHAN CYCLE_HSC EXTERN MMC COUPDEF TANGDEF".split()
 )
 """Calls after which the program goes on where it was."""
 
@@ -54,6 +57,8 @@ OPENS = frozenset(b"FOR WHILE LOOP IF".split())
 CLOSES = frozenset(b"ENDFOR ENDWHILE ENDLOOP ENDIF UNTIL".split())
 JUMPS = frozenset(b"GOTO GOTOF GOTOB GOTOC GOTOS REPEAT REPEATB CASE CALL PCALL EXTCALL CALLPATH".split())
 DECLARES = frozenset(b"DEF EXTERN REDEF PROC ID IDS WHEN WHENEVER FROM EVERY DEFINE STRING".split())
+SUPERIMPOSED = re.compile(rb"\$AA_T?OFF|\b(?:POS|MOV)\[")
+"""What a synchronous action does to axes while the program's own motions run."""
 QUIET_NAMES = frozenset(b"ELSE DEFAULT SAVE DISPLOF DISPLON SBLOF SBLON ACTBLOCNO ENDLABEL PREPRO".split())
 
 _HEAD = re.compile(
@@ -207,10 +212,15 @@ class _Taken:
                 return len(text)
             close = assigned_end(text, assigned.end())
             self.note("base" if name.startswith(b"$P_UIFR") else "assign", text[place:close].strip())
+            if name == b"$P_PFRAME":  # what it does is not read, as that of a frame from the machine
+                self.codes(place, close, b"TOFRAME")
             return close
         if name in self.names:
-            self.codes(place, end, name)
             closed = self.arguments(end)
+            if name != b"GEOAX" or text[end:closed].strip(
+                b"() \t"
+            ):  # without axes: those of the machine again
+                self.codes(place, end, name)
             if name == b"CYCLE800":
                 self.note("swivel", text[end:closed].strip())
             return closed
@@ -228,6 +238,8 @@ class _Taken:
         if name in ACTIONS:
             # It acts before the motion, as S and M do.
             self.word(place, key("S"), -1, end, math.nan, How.UNREAD)
+        elif name in LENGTHS:
+            self.word(place, key("D"), -1, end, math.nan, How.UNREAD)
         elif name in CORNERS or name in POLAR:
             self.note("corner" if name in CORNERS else "polar", name)
         elif name in SETTINGS:
@@ -291,6 +303,8 @@ class _Taken:
                 self.note("open" if name in OPENS else "close", said)
             else:
                 self.note("between" if name == b"ELSE" else "assign", said)
+                if SUPERIMPOSED.search(said):
+                    self.codes(place, len(text), b"TOFRAME")
             return len(text)
         closed = self.arguments(end)
         if name in QUIET_CALLS:

@@ -18,7 +18,7 @@ from postproc.languages.gcode.control import Control
 from postproc.languages.gcode.lexing import lex
 from postproc.languages.gcode.words import Note, key
 
-SIZE = 1 << 20
+SIZE = 1 << 18
 """Bytes that are lexed at a time."""
 
 

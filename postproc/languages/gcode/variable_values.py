@@ -25,6 +25,7 @@ class VariableValues:
     def __init__(self, language: ExpressionLanguage, known: Mapping[str, float], control: str) -> None:
         self._language, self._values = language, dict(known)
         self._bound = frozenset(known)
+        self._local: dict[str, bool] = {}
         self.volatile: set[str] = set()
         self.parallel = language is LINUXCNC
         self.result = math.nan
@@ -75,6 +76,12 @@ class VariableValues:
         self._values.clear()
 
     def _is_local(self, name: str) -> bool:
+        known = self._local.get(name)
+        if known is None:
+            known = self._local[name] = self._belongs_to_part(name)
+        return known
+
+    def _belongs_to_part(self, name: str) -> bool:
         if not self._language.numbered:
             return not _PARAMETER.fullmatch(name) and name not in self._bound
         number = _NUMBERED.fullmatch(name)
