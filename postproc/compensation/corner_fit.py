@@ -63,6 +63,9 @@ def fit_corners(
         motion = np.setdiff1d(motion, division.fits.point)
     # of points inserted before exact ends it is known once they are written
     motion = motion[~np.isnan(task.toolpath.approximation[division.source[motion]])]
+    # what is in air ends elsewhere only where it leads to a corrected start
+    source = division.source[motion]
+    motion = motion[task.carries[source] | np.isin(source, division.lead_ins)]
     if least:
         place = zip(division.source[motion].tolist(), division.share[motion].tolist(), strict=True)
         motion = motion[np.array([least.get(one, 0) < NEVER for one in place], bool)]
@@ -72,7 +75,7 @@ def fit_corners(
     if not bad.any():
         return result, division
     corners = corners.part(bad)
-    free = np.full(len(task.toolpath), not limits.no_insert)
+    free = np.full(len(task.toolpath), not limits.no_insert) & task.carries
     free[list(task.toolpath.constraints.no_insert_before)] = False
     chosen = PointChooser(task, division, limits, free, corners, size[bad]).choose()
     fitted = with_corners(task, result, division, chosen, np.ones(len(chosen.corner), bool))

@@ -97,6 +97,13 @@ _PATH_FIGURES: dict[str, Schema] = {
     "across_feed_mm": record(_SIDES, "error at the points across the feed; absent for predict"),
     "force_ramp_mm": quantity("mm", "shortest path over which a force step inside a cut is spread"),
     "force_ramps": integer("force steps inside cuts that are spread"),
+    "force_ramp_max": record(
+        {
+            "mm": quantity("mm", "its length", nullable=True),
+            "line": integer("line of the motion at whose start the force steps, 0 without one"),
+        },
+        "longest path over which a force step inside a cut is spread: more where the correction goes back along the feed",
+    ),
     "lead_ins": integer("motions in air that end where a corrected cut starts"),
     "stops_added": integer("exact stops that the correction adds inside cuts"),
     "backwards": integer("motions of the output against the feed"),
