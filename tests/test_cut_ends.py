@@ -24,7 +24,8 @@ START, APPROACH, LEAVE = (
 
 def one_side(entry: float, exit_: float) -> CompensationProblem:
     """One straight motion under force, entered from the air and left with approximations [m]."""
-    points = [START + APPROACH, START, START + [0.1, 0.0, 0.0], START + [0.1, 0.0, 0.0] + LEAVE]
+    end = START + np.array([0.1, 0.0, 0.0])
+    points = [START + APPROACH, START, end, end + LEAVE]
     return task(
         points,
         [False, False, True, False],

@@ -19,9 +19,9 @@ from postproc.compensation.rounded_path import (
     RoundedOutput,
     Run,
     approximations,
+    as_stated,
     extents,
     original_reach,
-    with_distance,
 )
 from postproc.compensation.subdivision import Subdivision, subdivided_motions
 from postproc.toolpath import Role
@@ -77,14 +77,18 @@ def compare_corners_at(task: CompensationProblem, division: Subdivision, motion:
     source = division.source[motion]
     unknown = np.isnan(approximations(task, division, motion))
     distance, difference, angle = (np.zeros(len(motion)) for _ in range(3))
+    known = as_stated(task, division) if not unknown.all() else (task, division)
 
     def compare(some: Ints, samples: Floats) -> None:
-        def compared(part: slice) -> None:
-            at = some[part]
-            output = RoundedOutput(task, division, motion[at])
-            distance[at], difference[at], angle[at] = evaluate_corners(output, motion[at], samples)
+        # what is stated is not taken for what an unknown one beside it may be
+        for among, run in ((some[~unknown[some]], known), (some[unknown[some]], (task, division))):
 
-        each_block(compared, len(some), BLOCK)
+            def compared(part: slice, among: Ints = among, run: Run = run) -> None:
+                at = among[part]
+                output = RoundedOutput(*run, motion[at])
+                distance[at], difference[at], angle[at] = evaluate_corners(output, motion[at], samples)
+
+            each_block(compared, len(among), BLOCK)
 
     close = np.zeros(len(motion), bool)
     if task.force.ramps is not None:
@@ -126,10 +130,10 @@ def with_rounded_ends(
     point = division.fits.point[division.role[division.fits.point] == Role.ORIGINAL]
     point = point[task.carries[division.source[point]]]
     values = {name: getattr(result, name).copy() for name in ("after", "after_angle", "across_after")}
-    row = division.source[point]
+    row, run = division.source[point], as_stated(task, division)
 
     def evaluated(part: slice) -> None:
-        _, off, angle = evaluate_corners(RoundedOutput(task, division, point[part]), point[part])
+        _, off, angle = evaluate_corners(RoundedOutput(*run, point[part]), point[part])
         values["after"][row[part]] = values["across_after"][row[part]] = off
         values["after_angle"][row[part]] = angle
 
@@ -151,10 +155,11 @@ def rounded_errors(
         changing = np.flatnonzero(np.isin(division.source, task.force.ramps.row))
         changing = np.setdiff1d(changing, fitted)
     found = []
-    for motion, run in ((fitted, (task, division)), (changing, with_distance(task, division, 0.0))):
+    run = as_stated(task, division)
+    for motion in (fitted, changing):
         some = motion[on[division.source[motion]] & ~division.transitions[motion]]
 
-        def largest(part: slice, some: Ints = some, run: Run = run) -> tuple[Floats, Floats]:
+        def largest(part: slice, some: Ints = some) -> tuple[Floats, Floats]:
             return RoundedOutput(*run, some[part]).largest(some[part])
 
         parts = [(np.empty(0),) * 2, *in_blocks(largest, len(some), BLOCK)]

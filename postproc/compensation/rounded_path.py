@@ -100,10 +100,27 @@ Run = tuple[CompensationProblem, Subdivision]
 def with_distance(task: CompensationProblem, division: Subdivision, distance: float) -> Run:
     """Both with the approximation ``distance`` [m] where nothing states one."""
     blend = approximations(task, division, np.arange(len(division)))
+    stated = replace(division, blend=np.nan_to_num(blend, nan=distance))
+    return _with_approximation(task, distance), stated
+
+
+def as_stated(task: CompensationProblem, division: Subdivision) -> Run:
+    """Both without the approximations of which nothing states the distance."""
+    known = np.isfinite(task.toolpath.approximation).all()
+    known = known and np.isfinite(approximations(task, division, np.arange(len(division)))).all()
+    return (task, division) if known else with_distance(task, division, 0.0)
+
+
+def stated_alone(task: CompensationProblem) -> CompensationProblem:
+    """The program without such approximations, for a division that is not written yet."""
+    return _with_approximation(task, 0.0) if np.isnan(task.toolpath.approximation).any() else task
+
+
+def _with_approximation(task: CompensationProblem, distance: float) -> CompensationProblem:
     path = replace(task.toolpath, approximation=np.nan_to_num(task.toolpath.approximation, nan=distance))
     other = replace(task, toolpath=path)
     vars(other)["desired_path"] = task.desired_path  # no approximation changes it
-    return other, replace(division, blend=np.nan_to_num(blend, nan=distance))
+    return other
 
 
 class RoundedOutput:

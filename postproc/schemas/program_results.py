@@ -102,7 +102,7 @@ _PATH_FIGURES: dict[str, Schema] = {
             "mm": quantity("mm", "its length", nullable=True),
             "line": integer("line of the motion at whose start the force steps, 0 without one"),
         },
-        "longest path over which a force step inside a cut is spread: more where the correction goes back along the feed",
+        "longest path over which a force step inside a cut is spread: longer where the correction goes back",
     ),
     "lead_ins": integer("motions in air that end where a corrected cut starts"),
     "stops_added": integer("exact stops that the correction adds inside cuts"),

@@ -33,7 +33,8 @@ def corner_findings(ready: Prepared, written: WrittenProgram) -> list[Finding]:
             within = np.floor(largest_distance(ready.task, written.division, corners) / MM * 100) / 100
             message = (
                 f"no approximation distance is stated; all corners are within the tolerance if the controller"
-                f" approximates from {within:.2f} mm on at most; with half of each motion, as far as it may, one differs"
+                f" approximates from {within:.2f} mm on at most; with half of each motion, as far as it may, one"
+                " differs"
             )
             help = f"limit what the control approximates to {within:.2f} mm, or state the distance in the program"
         message += f" by {off:.4f} mm from that of the original, {limit}"

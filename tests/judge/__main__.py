@@ -13,6 +13,7 @@ from pathlib import Path
 from .cases import CASES, DEG, PACKAGE, Outcome, run
 from .drawn import defects, drawn
 from .force import RULE
+from .further_cases import FURTHER
 from .motion import MM
 
 HEADER = (
@@ -54,7 +55,7 @@ def main(words: list[str]) -> int:
         else:
             package = Path(value).resolve()
     print(HEADER, flush=True)
-    cases = [drawn(number) for number in range(seed, seed + count)] if count else CASES
+    cases = [drawn(number) for number in range(seed, seed + count)] if count else [*CASES, *FURTHER]
     for case in cases:
         if words and not any(word in case.name for word in words):
             continue
