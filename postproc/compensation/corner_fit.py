@@ -30,6 +30,7 @@ from postproc.compensation.rounded_path import (
     stated_alone,
 )
 from postproc.compensation.subdivision import Limits, Subdivision
+from postproc.toolpath import Role
 
 ROUNDS, WEIGHINGS = 4, 24
 """How often the path is evaluated after a fit, and the weights raised within one."""
@@ -67,9 +68,10 @@ def fit_corners(
     motion = find_corners(task, result, division)
     if division.fits is not None:
         motion = np.setdiff1d(motion, division.fits.point)
-    # of points inserted before exact ends it is known once they are written
-    stated = ~np.isnan(task.toolpath.approximation[division.source[motion]])
-    motion = motion[stated & ~np.isnan(approximations(task, division, motion))]
+    # points before an exact end go by the motion before it
+    blend, source = task.toolpath.approximation, division.source[motion]
+    inserted = (division.role[motion] == Role.INTERMEDIATE) & (blend[source] == 0)
+    motion = motion[~np.isnan(blend[np.where(inserted, np.maximum(source - 1, 0), source)])]
     # what is in air ends elsewhere only where it leads to a corrected start
     source = division.source[motion]
     motion = motion[task.carries[source] | np.isin(source, division.lead_ins)]

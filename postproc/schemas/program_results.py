@@ -286,6 +286,9 @@ def _simulated(about: str) -> Schema:
             "lead-ins and lead-outs in air",
         ),
         unknown_corners=integer("points with an unknown approximation distance"),
+        points_alone=integer(
+            "points of cuts, as of splines and drilled holes, that are compared without a path between"
+        ),
         skipped=integer("motions that are not simulated"),
         worst=array(
             record(
