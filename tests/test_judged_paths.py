@@ -14,6 +14,7 @@ import pytest
 from judge.cases import CASES, CELL, CUT, OFF, Case, krl, pose, run
 from judge.cell import Cell
 from judge.force import Field
+from judge.further_cases import FURTHER
 from judge.judge import judge
 from judge.motion import DEG, MM, from_abc
 from judge.path import Path as Way
@@ -251,7 +252,9 @@ SLOW = re.compile(r"panel, forces x (0.5|2.5|5)|panel, tol|lean [1345679]$")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", [c for c in CASES if not SLOW.search(c.name)], ids=lambda c: c.name)
+@pytest.mark.parametrize(
+    "case", [c for c in [*CASES, *FURTHER] if not SLOW.search(c.name)], ids=lambda c: c.name
+)
 def test_the_written_path(case: Case, tmp_path: Path) -> None:
     outcome = run(case, tmp_path)
     if REPORTED.match(case.name):

@@ -200,3 +200,12 @@ def test_without_force_there_is_nothing_to_look_at(compensate, job):
 @pytest.mark.parametrize("words", [["nowhere.src"], []])
 def test_a_missing_program(compensate, job, words):
     assert compensate("verify", job.program, *words, "--force").code == (1 if words else 2)
+
+
+def test_of_a_spline_the_points_alone_are_compared_and_that_is_said(compensate, job):
+    points = [line.split(" C_DIS")[0].replace("LIN ", "SPL ") for line in LINES[9:12]]
+    job.write([*LINES[:9], "SPLINE", *points, "ENDSPLINE", *LINES[13:]])
+    compensate(job.program, "--force")
+    said = compensate("verify", job.program, job.output, "--force")
+    assert "along the whole path" not in said.out
+    assert "points of splines or drilled holes are compared alone" in said.out

@@ -22,8 +22,15 @@ from postproc.compensation.corners import compare_corners_at, evaluate_corners, 
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.ramp_points import NEVER, LeastPoints, choose_ramp_points
-from postproc.compensation.rounded_path import Blend, RoundedOutput, approximations
+from postproc.compensation.rounded_path import (
+    Blend,
+    RoundedOutput,
+    approximations,
+    as_stated,
+    stated_alone,
+)
 from postproc.compensation.subdivision import Limits, Subdivision
+from postproc.toolpath import Role
 
 ROUNDS, WEIGHINGS = 4, 24
 """How often the path is evaluated after a fit, and the weights raised within one."""
@@ -63,18 +70,25 @@ def fit_corners(
     motion = find_corners(task, result, division)
     if division.fits is not None:
         motion = np.setdiff1d(motion, division.fits.point)
-    # of points inserted before exact ends it is known once they are written
-    motion = motion[~np.isnan(task.toolpath.approximation[division.source[motion]])]
+    # points before an exact end go by the motion before it
+    blend, source = task.toolpath.approximation, division.source[motion]
+    inserted = (division.role[motion] == Role.INTERMEDIATE) & (blend[source] == 0)
+    motion = motion[~np.isnan(blend[np.where(inserted, np.maximum(source - 1, 0), source)])]
+    # what is in air ends elsewhere only where it leads to a corrected start
+    source = division.source[motion]
+    motion = motion[task.carries[source] | np.isin(source, division.lead_ins)]
     if least:
         place = zip(division.source[motion].tolist(), division.share[motion].tolist(), strict=True)
         motion = motion[np.array([least.get(one, 0) < NEVER for one in place], bool)]
-    corners = compare_corners_at(task, division, suspect_corners(task, result, division, motion))
+    motion = suspect_corners(task, result, division, motion)
+    task = stated_alone(task)
+    corners = compare_corners_at(task, division, motion)
     size = _size(task, corners.difference, corners.angle)
     bad = (size > 1.0) & np.isfinite(size)
     if not bad.any():
         return result, division
     corners = corners.part(bad)
-    free = np.full(len(task.toolpath), not limits.no_insert)
+    free = np.full(len(task.toolpath), not limits.no_insert) & task.carries
     free[list(task.toolpath.constraints.no_insert_before)] = False
     chosen = PointChooser(task, division, limits, free, corners, size[bad]).choose()
     fitted = with_corners(task, result, division, chosen, np.ones(len(chosen.corner), bool))
@@ -103,8 +117,9 @@ def _fit_ramps(
         chosen = replace(chosen, before=np.full(len(chosen.corner), 1.0 / ALLOWED))
         fitted = with_corners(task, result, part, chosen, np.ones(len(chosen.corner), bool))
         enough = ON_RAMPS / ALLOWED
-        fitted, _ = _fitted(task, fitted, enough)
-        after = _largest(task, fitted)
+        stated = stated_alone(task)
+        fitted, _ = _fitted(stated, fitted, enough)
+        after = _largest(stated, fitted)
         bad = ~(after <= enough)
         if not bad.any():
             return fitted.result(task, result), fitted.division
@@ -122,9 +137,10 @@ def corners_not_improved(task: CompensationProblem, division: Subdivision) -> Le
 
 def _at_points(task: CompensationProblem, division: Subdivision, point: Ints) -> Floats:
     """(P,) the errors where the motions ``point`` (P,) are rounded off, in parts of the allowed one."""
+    run = as_stated(task, division)
 
     def evaluated(part: slice) -> Floats:
-        return _size(task, *evaluate_corners(RoundedOutput(task, division, point[part]), point[part])[1:])
+        return _size(task, *evaluate_corners(RoundedOutput(*run, point[part]), point[part])[1:])
 
     return np.concatenate([np.empty(0), *in_blocks(evaluated, len(point), BLOCK)])
 

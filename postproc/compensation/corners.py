@@ -15,7 +15,14 @@ from postproc.base.batches import each_block, in_blocks
 from postproc.base.geometry import lengths
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.problem import CompensationProblem
-from postproc.compensation.rounded_path import RoundedOutput, approximations, extents, original_reach
+from postproc.compensation.rounded_path import (
+    RoundedOutput,
+    Run,
+    approximations,
+    as_stated,
+    extents,
+    original_reach,
+)
 from postproc.compensation.subdivision import Subdivision, subdivided_motions
 from postproc.toolpath import Role
 
@@ -70,14 +77,18 @@ def compare_corners_at(task: CompensationProblem, division: Subdivision, motion:
     source = division.source[motion]
     unknown = np.isnan(approximations(task, division, motion))
     distance, difference, angle = (np.zeros(len(motion)) for _ in range(3))
+    known = as_stated(task, division) if not unknown.all() else (task, division)
 
     def compare(some: Ints, samples: Floats) -> None:
-        def compared(part: slice) -> None:
-            at = some[part]
-            output = RoundedOutput(task, division, motion[at])
-            distance[at], difference[at], angle[at] = evaluate_corners(output, motion[at], samples)
+        # what is stated is not taken for what an unknown one beside it may be
+        for among, run in ((some[~unknown[some]], known), (some[unknown[some]], (task, division))):
 
-        each_block(compared, len(some), BLOCK)
+            def compared(part: slice, among: Ints = among, run: Run = run) -> None:
+                at = among[part]
+                output = RoundedOutput(*run, motion[at])
+                distance[at], difference[at], angle[at] = evaluate_corners(output, motion[at], samples)
+
+            each_block(compared, len(among), BLOCK)
 
     close = np.zeros(len(motion), bool)
     if task.force.ramps is not None:
@@ -119,11 +130,12 @@ def with_rounded_ends(
     if division.fits is None:
         return result
     point = division.fits.point[division.role[division.fits.point] == Role.ORIGINAL]
+    point = point[task.carries[division.source[point]]]
     values = {name: getattr(result, name).copy() for name in ("after", "after_angle", "across_after")}
-    row = division.source[point]
+    row, run = division.source[point], as_stated(task, division)
 
     def evaluated(part: slice) -> None:
-        _, off, angle = evaluate_corners(RoundedOutput(task, division, point[part]), point[part])
+        _, off, angle = evaluate_corners(RoundedOutput(*run, point[part]), point[part])
         values["after"][row[part]] = values["across_after"][row[part]] = off
         values["after_angle"][row[part]] = angle
 
@@ -135,23 +147,22 @@ def rounded_errors(
     task: CompensationProblem, result: CorrectionResult, division: Subdivision
 ) -> tuple[Ints, Floats, Floats]:
     """Motions (K,) of a division that start or end in points of fitted corners, or on which the force changes over a
-    ramp and approximations are stated, and by how much (K,) [m], (K,) [rad] the tool is off along them at most, as they
-    are rounded."""
+    ramp, and by how much (K,) [m], (K,) [rad] the tool is off along them at most, as they are rounded; on ramps without
+    where no distance is stated."""
     on = result.corrected & task.desired_path.traceable & (task.desired_path.length > 0) & task.carries
     fitted = changing = np.empty(0, np.int64)
     if division.fits is not None:
         fitted = np.unique(np.concatenate([division.fits.point, division.fits.point + 1]))
     if task.force.ramps is not None:
-        row = np.unique(task.force.ramps.row)
-        stated = np.isfinite(task.toolpath.approximation)
-        changing = np.flatnonzero(np.isin(division.source, row[stated[row] & stated[row - 1]]))
+        changing = np.flatnonzero(np.isin(division.source, task.force.ramps.row))
         changing = np.setdiff1d(changing, fitted)
     found = []
-    for motion, unknown in ((fitted, np.inf), (changing, 0.0)):
+    run = as_stated(task, division)
+    for motion in (fitted, changing):
         some = motion[on[division.source[motion]] & ~division.transitions[motion]]
 
-        def largest(part: slice, some: Ints = some, unknown: float = unknown) -> tuple[Floats, Floats]:
-            return RoundedOutput(task, division, some[part], unknown).largest(some[part])
+        def largest(part: slice, some: Ints = some) -> tuple[Floats, Floats]:
+            return RoundedOutput(*run, some[part]).largest(some[part])
 
         parts = [(np.empty(0),) * 2, *in_blocks(largest, len(some), BLOCK)]
         found.append((some, *(np.concatenate([part[i] for part in parts]) for i in range(2))))
@@ -170,6 +181,7 @@ def find_corners(task: CompensationProblem, result: CorrectionResult, division: 
     path = task.toolpath
     goes_on = on[one] & on[two] & (path.tool[one] == path.tool[two]) & (result.cut[one] == result.cut[two])
     motion = motion[goes_on & ~(approximations(task, division, motion) <= 0)]
+    motion = np.union1d(motion, _ends_of_cuts(task, on, division))
 
     def size(part: slice) -> Floats:
         return _cut_off(task, division, motion[part])
@@ -204,6 +216,15 @@ def _candidates(
     return np.unique(np.concatenate([own[row[chosen | ~plain]], inserted]))
 
 
+def _ends_of_cuts(task: CompensationProblem, on: Bools, division: Subdivision) -> Ints:
+    """Motions at whose end a cut is entered from the air, or left, without a stop."""
+    path, traceable = task.toolpath, task.desired_path.traceable & (task.desired_path.length > 0)
+    ends = (on[1:] & ~task.carries[:-1]) | (on[:-1] & ~task.carries[1:])
+    ends &= traceable[1:] & traceable[:-1] & path.continues[1:] & (path.tool[1:] == path.tool[:-1])
+    motion = np.flatnonzero(division.original)[np.flatnonzero(ends & ~(path.approximation[:-1] <= 0))]
+    return np.asarray(motion[~division.transitions[motion + 1]])
+
+
 def _turning(task: CompensationProblem, result: CorrectionResult, rows: Ints) -> Floats:
     """(K, 3) change of the correction's turn, rad a m, along motions ``rows`` (K,)."""
     change = result.turn[rows] - result.turn[np.maximum(rows - 1, 0)]
@@ -234,11 +255,11 @@ def suspect_corners(
     """
     source = division.source[motion]
     close = division.role[motion] != Role.ORIGINAL
+    later = np.minimum(source + 1, len(task.toolpath) - 1)
+    close |= ~task.carries[source] | ~task.carries[later]
     if task.force.ramps is not None:
         close |= np.isin(source, task.force.ramps.row) | np.isin(source + 1, task.force.ramps.row)
-    close |= (
-        task.desired_path.arc[source] | task.desired_path.arc[np.minimum(source + 1, len(task.toolpath) - 1)]
-    )
+    close |= task.desired_path.arc[source] | task.desired_path.arc[later]
     few = np.flatnonzero(~close)
 
     def differs(part: slice) -> Bools:

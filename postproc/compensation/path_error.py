@@ -32,6 +32,10 @@ ON_RAMPS = (0.125, 0.375, 0.625, 0.875)
 SHORT, LITTLE = 30 * MM, 3 * DEG
 """Of a segment that is shorter and turns by less, along an arc or in place, the middle is enough."""
 
+SECANTS, FLATTEST, SAME_PLACE = 6, 0.05, 1e-7
+"""Steps to the place whose force a tool has, the least share of its way on the path that it goes under load, and [m]
+a step that is none."""
+
 TURNED = 0.02
 """Share of the tolerance: a turn of the wanted orientation, where the tool is early or late, that is not looked at."""
 
@@ -189,8 +193,8 @@ def _errors(
     rows, shares = segments.rows, np.broadcast_to(share, len(segments))
     along = segments.along(shares)
     wanted = task.desired_path.at(rows, along)
-    wrench = task.force.along(rows, along)
     command = segments.commands(task, shares)
+    wrench = task.force.along(rows, _places(task, rows, along, command))
     real = task.simulated(rows, command, wrench, share=along, corrected=True)
     goal = task.goal(rows, wanted, along)
     shift, turn = _beside(task, rows, along, real.pose, wanted, goal, shown)
@@ -203,6 +207,39 @@ def _errors(
     good = real.reachable & real.settled
     off, angle = (np.where(good, lengths(part), np.inf) for part in (shift, turn))
     return off, angle
+
+
+def _places(task: CompensationProblem, rows: Ints, share: Floats, command: Poses) -> Floats:
+    """(K,) the shares of the places whose force the tools at ``command`` (K) have: those of ``rows`` (K,) that they are
+    nearest to.  On ramps of the force that is another place than ``share`` (K,); looked for by secants where it is not
+    known how corners are rounded off: elsewhere the rounded path is evaluated as a whole."""
+    if task.force.ramps is None:
+        return share
+    unknown = np.isnan(task.toolpath.approximation[rows])
+    some = np.flatnonzero(
+        unknown & np.isin(rows, task.force.ramps.row) & (task.desired_path.length[rows] > 0)
+    )
+    if not len(some):
+        return share
+    row, there = rows[some], command[some]
+    length = task.desired_path.length[row]
+    at = share[some].copy()
+    last, moved = np.full(len(some), np.nan), np.full(len(some), np.nan)
+    for _ in range(SECANTS):
+        real = task.simulated(row, there, task.force.along(row, at), share=at, corrected=True)
+        goal = task.goal(row, task.desired_path.at(row, at), at)
+        ahead = np.sum((real.pose.position - goal.position) * task.desired_path.tangent(row, at), axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            slope = (last - ahead) / moved
+        slope = np.where(np.isfinite(slope), np.clip(slope, FLATTEST, 1.0 / FLATTEST), 1.0)
+        step = np.where(real.settled & real.reachable, ahead / slope, 0.0)
+        if not (np.abs(step) > SAME_PLACE).any():
+            break
+        last, moved = ahead, step
+        at = np.clip(at + step / length, 0.0, 1.0)
+    found = share.copy()
+    found[some] = at
+    return found
 
 
 def _beside(

@@ -9,12 +9,12 @@ that is the quadratic Bezier curve with the end point as its control point.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from postproc.base.arrays import Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.geometry import Poses, lengths
 from postproc.base.units import MM
 from postproc.compensation.desired_path import interpolate_poses
@@ -93,14 +93,42 @@ def approximations(task: CompensationProblem, division: Subdivision, motions: In
     return np.where(division.role[motions] == Role.TRANSITION, np.nan, blend)
 
 
-class RoundedOutput:
-    """A part of a division, with its parabolas: ``motions`` (K,) and those beside them.  ``unknown`` [m]: what an
-    approximation is taken for that nothing states."""
+Run = tuple[CompensationProblem, Subdivision]
+"""A program and its output."""
 
-    def __init__(
-        self, task: CompensationProblem, division: Subdivision, motions: Ints, unknown: float = np.inf
-    ) -> None:
-        self.task, self.division, self.unknown = task, division, unknown
+
+def with_distance(task: CompensationProblem, division: Subdivision, distance: float) -> Run:
+    """Both with the approximation ``distance`` [m] where nothing states one."""
+    blend = approximations(task, division, np.arange(len(division)))
+    stated = replace(division, blend=np.nan_to_num(blend, nan=distance))
+    return _with_approximation(task, distance), stated
+
+
+def as_stated(task: CompensationProblem, division: Subdivision) -> Run:
+    """Both without the approximations of which nothing states the distance."""
+    known = np.isfinite(task.toolpath.approximation).all()
+    known = known and np.isfinite(approximations(task, division, np.arange(len(division)))).all()
+    return (task, division) if known else with_distance(task, division, 0.0)
+
+
+def stated_alone(task: CompensationProblem) -> CompensationProblem:
+    """The program without such approximations, for a division that is not written yet."""
+    return _with_approximation(task, 0.0) if np.isnan(task.toolpath.approximation).any() else task
+
+
+def _with_approximation(task: CompensationProblem, distance: float) -> CompensationProblem:
+    path = replace(task.toolpath, approximation=np.nan_to_num(task.toolpath.approximation, nan=distance))
+    other = replace(task, toolpath=path)
+    vars(other)["desired_path"] = task.desired_path  # no approximation changes it
+    return other
+
+
+class RoundedOutput:
+    """A part of a division, with its parabolas: ``motions`` (K,) and those beside them.  What nothing states is taken
+    for the largest approximation that there may be."""
+
+    def __init__(self, task: CompensationProblem, division: Subdivision, motions: Ints) -> None:
+        self.task, self.division = task, division
         near = np.unique(np.clip(motions[:, None] + np.arange(-1, 3), 0, len(division) - 1))
         self.motions = near[task.desired_path.traceable[division.source[near]]]
         self.segments = subdivided_motions(task, division, self.motions)
@@ -115,7 +143,7 @@ class RoundedOutput:
         path = self.task.toolpath
         goes_on = path.continues[source[next_here + 1]] | (source[next_here + 1] == source[next_here])
         at = next_here[goes_on & (path.tool[source[next_here]] == path.tool[source[next_here + 1]])]
-        blend = np.nan_to_num(approximations(self.task, self.division, self.motions[at]), nan=self.unknown)
+        blend = np.nan_to_num(approximations(self.task, self.division, self.motions[at]), nan=np.inf)
         reach[at] = np.fmin(blend, 0.5 * np.minimum(self.extent[at], self.extent[at + 1]))
         return reach
 
@@ -253,7 +281,21 @@ class RoundedOutput:
         """Of the tool under load at the shares (S,) of the segments ``at`` (S,), parabolas included."""
         command = self.commands(self.blend(at, share))
         segments = self.segments[at]
-        return deviations(self.task, command, segments.rows, segments.along(share))
+        found = deviations(
+            self.task, command, segments.rows, segments.along(share), self._ends_of_cuts(at, share)
+        )
+        air = ~self.task.carries[segments.rows]  # nothing is cut there
+        if air.any():
+            found.shift[air], found.turn[air] = 0.0, 0.0
+        return found
+
+    def _ends_of_cuts(self, at: Ints, share: Floats) -> Bools:
+        """(S,) where a cut is entered or left on a parabola: there it is an error to be early or late as well."""
+        cut = self.task.carries[self.segments.rows]
+        flows = self.reach[:-1] > 0
+        entered = np.append(False, cut[1:] & ~cut[:-1] & flows)
+        left = np.append(cut[:-1] & ~cut[1:] & flows, False)
+        return np.asarray((entered[at] & (share == 0.0)) | (left[at] & (share == 1.0)))
 
 
 def original_blend(task: CompensationProblem, row: Ints, share: Floats) -> tuple[Ints, Floats, Floats]:
@@ -317,8 +359,11 @@ def _moved(task: CompensationProblem, row: Ints, share: Floats, step: Floats) ->
     return row, np.clip(share, 0.0, 1.0)
 
 
-def deviations(task: CompensationProblem, command: Poses, row: Ints, share: Floats) -> Deviations:
-    """How the tools at ``command`` (S) under load deviate from the program's path, parabolas included.
+def deviations(
+    task: CompensationProblem, command: Poses, row: Ints, share: Floats, ends: Bools | None = None
+) -> Deviations:
+    """How the tools at ``command`` (S) under load deviate from the program's path, parabolas included; from row (S,)
+    and share (S,) themselves at the ``ends`` (S,) of cuts.
 
     The force belongs to the place of the path that the tool is nearest to, where the path is square to the way to it;
     it is found by secants along the path, from row (S,) and share (S,) on.
@@ -336,6 +381,8 @@ def deviations(task: CompensationProblem, command: Poses, row: Ints, share: Floa
         real = task.simulated(at, here, task.force.along(at, where), share=where, corrected=True)
         shift, turn = task.visible_errors(at, real.pose, goal)
         gap = np.sum(shift * tangent, axis=1)
+        if ends is not None:
+            gap[ends[active]] = 0.0
         good = real.reachable & real.settled
         shift = shift - gap[:, None] * tangent
         found.shift[active] = np.where(good[:, None], shift, np.inf)

@@ -66,27 +66,42 @@ class WrittenProgram:
 
     @property
     def path_error(self) -> Floats:
-        """(M,) [m] the largest distance from the wanted path inside of each corrected motion, NaN for all others."""
-        return self._path[0]
+        """(M,) [m] the largest distance from the wanted path inside of each corrected motion and of the corner that the
+        controller rounds off at its end, where it states from where on; NaN for all others."""
+        return self._path_run[0]
 
     @property
     def between_angle(self) -> Floats:
-        """(M,) [rad] the largest angle from the wanted orientation inside of each corrected motion, NaN for others."""
-        return self._path[1]
+        """(M,) [rad] the largest angle from the wanted orientation there."""
+        return self._path_run[1]
 
     @property
     def off_between(self) -> Floats:
-        """(M,) [m] as ``path_error``, from the path that the gain asks for."""
+        """(M,) [m] inside of each motion, not rounded off, from the path that the gain asks for."""
         return self._path_of_gain[0]
 
     @property
     def off_between_angle(self) -> Floats:
-        """(M,) [rad] as ``between_angle``, from the path that the gain asks for."""
+        """(M,) [rad] the angle there."""
         return self._path_of_gain[1]
+
+    @property
+    def error_between(self) -> Floats:
+        """(M,) [m] as ``path_error``, of other corners than fitted ones as if they were not rounded off."""
+        return self._path[0]
 
     @cached_property
     def _path(self) -> tuple[Floats, Floats]:
         return path_errors_as_written(self.task, self.result, self.division)
+
+    @cached_property
+    def _path_run(self) -> tuple[Floats, Floats]:
+        errors, angles = (values.copy() for values in self._path)
+        corners = self.corners.part(~self.corners.unknown)
+        if self.task.gain == 1.0:  # a share of the correction moves corners as it moves the rest
+            np.fmax.at(errors, corners.motion, corners.difference)
+            np.fmax.at(angles, corners.motion, corners.angle)
+        return errors, angles
 
     @cached_property
     def _path_of_gain(self) -> tuple[Floats, Floats]:

@@ -68,6 +68,8 @@ class TransitionMove:
 class PathFigures:
     """Errors [m] at the end points of cutting motions along the feed and across it, before and after the correction;
     ``ramp`` [m]: over which a force that steps inside a cut goes over at least; ``ramps``: how many there are;
+    ``longest_ramp`` [m], NaN without one, before the motion in ``longest_ramp_line``: a correction that goes back along
+    the feed needs more;
     ``transitions``: what the output does where the correction changes."""
 
     along_before: Spread
@@ -76,6 +78,8 @@ class PathFigures:
     across_after: Spread
     ramp: float
     ramps: int
+    longest_ramp: float
+    longest_ramp_line: int
     transitions: Transitions
 
     def as_json(self) -> dict[str, object]:
@@ -85,6 +89,7 @@ class PathFigures:
             "across_feed_mm": {"before": self.across_before.as_mm(), "after": self.across_after.as_mm()},
             "force_ramp_mm": round(self.ramp / MM, 6),
             "force_ramps": self.ramps,
+            "force_ramp_max": {"mm": _finite(self.longest_ramp / MM), "line": self.longest_ramp_line},
             "lead_ins": transitions.lead_ins,
             "stops_added": transitions.stops,
             "backwards": transitions.backwards,

@@ -117,7 +117,15 @@ def _before_after(before: Spread, after: Spread) -> str:
 def _transitions(path: PathFigures) -> str:
     """Lead-ins, and what the output does where its correction changes."""
     transitions = path.transitions
-    ramps = f", {_count(path.ramps, 'force ramp')} of at least {path.ramp / MM:g} mm" if path.ramps else ""
+    ramps = ""
+    if path.ramps:
+        longest = f"{path.longest_ramp / MM:.1f} mm (line {path.longest_ramp_line})"
+        reach = (
+            f"{path.ramp / MM:g} to {longest}"
+            if path.longest_ramp > 1.001 * path.ramp
+            else f"{path.ramp / MM:g} mm"
+        )
+        ramps = f", {_count(path.ramps, 'force ramp')} of {reach}"
     speed = f", {transitions.speed / MM:.1f} mm/s" if math.isfinite(transitions.speed) else ""
     rate = (
         f", correction changes by at most {transitions.rate:.3f} mm/mm{speed} (line {transitions.rate_line})"

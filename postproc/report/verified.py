@@ -36,8 +36,9 @@ class PathComparison:
     change_turn [rad]: what twice as many samples changed of the largest; stops: exact stops inside cuts; backwards:
     motions against the feed;
     approaches, approach_length [m]: motions in air to where a cut starts corrected; unknown_corners: approximated by a
-    distance that is not known, run as they are programmed; skipped: motions that were not simulated; converged: force
-    and place agree everywhere, else there are no figures."""
+    distance that is not known, run as they are programmed; points_alone: motions of whose path only the controller
+    knows more than the end point, as of splines and drilled holes; skipped: motions that were not simulated;
+    converged: force and place agree everywhere, else there are no figures."""
 
     samples: int
     error: Spread
@@ -52,6 +53,7 @@ class PathComparison:
     approaches: int
     approach_length: float
     unknown_corners: int
+    points_alone: int
     skipped: int
     converged: bool
     worst: tuple[WorstError, ...]
@@ -76,6 +78,7 @@ class PathComparison:
             "backwards": self.backwards,
             "approaches": {"count": self.approaches, "length_mm": round(self.approach_length / MM, 3)},
             "unknown_corners": self.unknown_corners,
+            "points_alone": self.points_alone,
             "skipped": self.skipped,
             "worst": self.worst_as_json(),
         }
@@ -158,7 +161,8 @@ def verdict_sentence(done: Verified) -> str:
         ),
     )
     if done.verdict == WITHIN:
-        return "within tolerance along the whole path: " + ", ".join(
+        where = "where it is compared" if comparison.points_alone else "along the whole path"
+        return f"within tolerance {where}: " + ", ".join(
             f"{value} of {allowed}" for value, allowed, _ in found
         )
     exceeded = [f"{value} exceeds the tolerance {allowed}" for value, allowed, beyond in found if beyond]
@@ -238,6 +242,10 @@ def sampling_notes(comparison: PathComparison) -> list[str]:
     if comparison.approaches:
         length = comparison.approach_length / MM
         notes.append(f"{comparison.approaches} lead-ins and lead-outs in air, {length:.1f} mm")
+    if comparison.points_alone:
+        notes.append(
+            f"{comparison.points_alone} points of splines or drilled holes are compared alone, and no path between them"
+        )
     if comparison.unknown_corners:
         notes.append(
             f"{comparison.unknown_corners} points have an unknown approximation distance; both programs are simulated"
@@ -250,8 +258,7 @@ def _describe_sampling(comparison: PathComparison) -> str:
     if not comparison.converged:
         return "force and position do not converge everywhere in the compensated program: its errors are not known"
     if math.isnan(comparison.ends.max):
-        holes = ": only holes are compared, at their bottom" if comparison.samples else ""
-        return f"no path between end points is sampled{holes}"
+        return "no path between end points is sampled"
     if math.isnan(comparison.change):
         return "the samples are not doubled: there are too many"
     return (

@@ -97,6 +97,13 @@ _PATH_FIGURES: dict[str, Schema] = {
     "across_feed_mm": record(_SIDES, "error at the points across the feed; absent for predict"),
     "force_ramp_mm": quantity("mm", "shortest path over which a force step inside a cut is spread"),
     "force_ramps": integer("force steps inside cuts that are spread"),
+    "force_ramp_max": record(
+        {
+            "mm": quantity("mm", "its length", nullable=True),
+            "line": integer("line of the motion at whose start the force steps, 0 without one"),
+        },
+        "longest path over which a force step inside a cut is spread: longer where the correction goes back",
+    ),
     "lead_ins": integer("motions in air that end where a corrected cut starts"),
     "stops_added": integer("exact stops that the correction adds inside cuts"),
     "backwards": integer("motions of the output against the feed"),
@@ -276,6 +283,9 @@ def _simulated(about: str) -> Schema:
             "lead-ins and lead-outs in air",
         ),
         unknown_corners=integer("points with an unknown approximation distance"),
+        points_alone=integer(
+            "points of cuts, as of splines and drilled holes, that are compared without a path between"
+        ),
         skipped=integer("motions that are not simulated"),
         worst=array(
             record(

@@ -101,13 +101,20 @@ def _path_figures(
     beside = np.where(result.corrected, result.across_after, across)[rows]
     ahead = np.sqrt(np.maximum(result.after[rows] ** 2 - beside**2, 0.0))
     ramps = task.force.ramps
+    starts = rows[:0] if ramps is None else np.flatnonzero(ramps.start == 0.0)
+    longest, line = math.nan, 0
+    if ramps is not None and len(starts):
+        most = starts[np.argmax(ramps.length[starts])]
+        longest, line = float(ramps.length[most]), int(task.toolpath.line[ramps.row[most]])
     return PathFigures(
         Spread.of(np.abs(along[scope])),
         Spread.of(across[scope]),
         Spread.of(ahead),
         Spread.of(beside),
         task.ramp,
-        0 if ramps is None else int((ramps.start == 0.0).sum()),
+        len(starts),
+        longest,
+        line,
         written.transitions,
     )
 

@@ -137,7 +137,7 @@ def _compensate(request: Request, stage: Stage) -> Report:
         del intended  # before its place is needed
         result, division = written.result, written.division
         release_free_memory()
-        worse = cuts_not_improved(task, result, division, written.path_error, written.across_before)
+        worse = cuts_not_improved(task, result, division, written.error_between, written.across_before)
         corners = corners_not_improved(task, division)
         if not worse and not corners:
             break

@@ -103,7 +103,7 @@ def _cell_of(ready: Prepared) -> Path | None:
 def _path_comparison(
     simulator: Simulator, ready: Prepared, simulation: Simulation, manner: PathManner
 ) -> PathComparison:
-    samples = simulation.samples
+    samples, cuts = simulation.samples, simulator.pairing.stretches
     none = Spread(np.nan, np.nan, np.nan)
     figures = simulation.converged and len(samples.motion) > 0
     ends = samples.first | samples.last
@@ -125,6 +125,7 @@ def _path_comparison(
         approaches=len(simulation.approaches),
         approach_length=simulation.approach_length,
         unknown_corners=simulation.unknown,
+        points_alone=int((cuts.stop - cuts.start)[~cuts.length].sum()),
         skipped=simulation.skipped,
         converged=simulation.converged,
         worst=_worst(simulator, ready, simulation),

@@ -1,4 +1,5 @@
-"""``python -m tests.judge [--rule centred|after|stretched] [words of names]``: what the judge finds of the cases.
+"""``python -m tests.judge [--rule centred|after|stretched] [words of names]``: what the judge finds of the cases;
+``further``: of those of ``further_cases``.
 
 ``--package FOLDER`` judges the package that lies there.  ``--drawn COUNT [--seed S]``: of so many programs drawn at
 random instead, where a line with exit 0 that failed, or whose error ``verify`` does not see, is a defect.
@@ -13,6 +14,7 @@ from pathlib import Path
 from .cases import CASES, DEG, PACKAGE, Outcome, run
 from .drawn import defects, drawn
 from .force import RULE
+from .further_cases import FURTHER
 from .motion import MM
 
 HEADER = (
@@ -54,9 +56,15 @@ def main(words: list[str]) -> int:
         else:
             package = Path(value).resolve()
     print(HEADER, flush=True)
-    cases = [drawn(number) for number in range(seed, seed + count)] if count else CASES
+    cases = (
+        [drawn(number) for number in range(seed, seed + count)]
+        if count
+        else FURTHER
+        if words == ["further"]
+        else CASES
+    )
     for case in cases:
-        if words and not any(word in case.name for word in words):
+        if words not in ([], ["further"]) and not any(word in case.name for word in words):
             continue
         with tempfile.TemporaryDirectory() as folder:
             outcome = run(case, Path(folder), verify=True, rule=rule or RULE, package=package)

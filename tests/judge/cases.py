@@ -92,8 +92,9 @@ def run(case: Case, folder: Path, verify: bool = False, rule: str = RULE, packag
     told = _command("verify", program, output, "--force", "--json", "-", package=package)
     if told.stdout.lstrip().startswith("{"):
         said = json.loads(told.stdout)
+        found = [said.get(which) or {} for which in ("compensated", "original")]
         outcome.verify, outcome.verify_before = (
-            (said.get(which) or {}).get("max") for which in ("compensated", "original")
+            None if one.get("max") is None else max(one["max"], one.get("missed") or 0.0) for one in found
         )
     return outcome
 

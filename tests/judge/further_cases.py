@@ -1,0 +1,98 @@
+"""More programs: cuts that are entered and left without a stop, forces that change on arcs, closed contours, short
+motions, unstated approximations, several tools, a turned robot on a track."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from .cases import CELL, CUT, FIVE_AXIS, OFF, Case, gcode, krl, pose, track
+
+Place = tuple[float, float, float]
+START: Place = (0, 0, 0)
+SLANT: Place = (-30, -20, 30)
+
+
+def contour(
+    points: list[tuple[float, float]], suffix: str, distance: float, approach: str = "", leave: str = "",
+    above: Place = (0, 0, 50),
+) -> Callable[[Path], Path]:  # fmt: skip
+    """Straight motions through ``points`` with the ``suffix``, from the start; how it is entered and left."""
+    last = points[-1]
+    return krl(
+        f"LIN {pose(*above)}", f"LIN {pose(*START)} {approach}".strip(), CUT,
+        *(f"LIN {pose(x, y, 0)} {suffix}" for x, y in points[:-1]), f"LIN {pose(*last, 0)} {leave}".strip(),
+        OFF, f"LIN {pose(*last, 50)}", head=(f"$APO.CDIS={distance}",),
+    )  # fmt: skip
+
+
+SQUARE = [(150.0, 0.0), (150.0, 100.0), (0.0, 100.0), (0.0, 2.0)]
+
+
+def half_circle(suffix: str) -> Callable[[Path], Path]:
+    """Two quarters of a circle; the force steps between them."""
+    return krl(
+        f"LIN {pose(0, 0, 50)}", f"LIN {pose(*START)}", CUT, f"LIN {pose(60, 0, 0)} {suffix}".strip(),
+        f"CIRC {pose(88.284, 11.716, 0)},{pose(100, 40, 0)} {suffix}".strip(), ";FORCE -40 80 -60 @feed",
+        f"CIRC {pose(88.284, 68.284, 0)},{pose(60, 80, 0)} {suffix}".strip(), f"LIN {pose(0, 80, 0)}", OFF,
+        f"LIN {pose(0, 80, 50)}", head=("$APO.CDIS=0.5",),
+    )  # fmt: skip
+
+
+def whole_circle() -> Callable[[Path], Path]:
+    return krl(f"LIN {pose(0, 0, 50)}", f"LIN {pose(*START)}", CUT, f"CIRC {pose(30, 30, 0)},{pose(60, 0, 0)},CA 360",
+               OFF, f"LIN {pose(0, 0, 50)}")  # fmt: skip
+
+
+def short_motions() -> Callable[[Path], Path]:
+    angle = np.linspace(0, 2 * np.pi, 400)[1:]
+    return contour([(30 - 30 * np.cos(a), 30 * np.sin(a)) for a in angle], "C_DIS", 0.5)
+
+
+def blended(word: str) -> Callable[[Path], Path]:
+    return gcode(
+        "G21 G90 G17 G54", "T1 M6", word, "G0 X0. Y0. Z20.", "G1 Z0. F600", "(FORCE -150 260 -60 @FEED)",
+        "G1 X100. F1800", "G1 Y60.", "G1 X0.", "(FORCE OFF)", "G1 Z20. F3000",
+        cell=FIVE_AXIS.replace("fanuc", "linuxcnc"),
+    )  # fmt: skip
+
+
+def turned_track(begin: float, end: float) -> Callable[[Path], Path]:
+    """As ``track``, of a robot that is mounted turned against its direction."""
+
+    def build(folder: Path) -> Path:
+        program = track(begin, end, "cell")(folder)
+        with (folder / "cell.yaml").open("a") as cell:
+            cell.write("robot_base: {x: 20, y: -30, z: 10, a: 25, b: 2, c: -3}\n")
+        return program
+
+    return build
+
+
+def two_tools() -> Callable[[Path], Path]:
+    other = "  2: {x: 60, y: 40, z: 320, a: 10, b: 45, c: 5, axis: +z}\nbases:"
+    return krl(
+        f"LIN {pose(0, 0, 50)}", f"LIN {pose(*START)}", CUT, f"LIN {pose(60, 0, 0)}", OFF, f"LIN {pose(60, 0, 50)}",
+        "$TOOL=TOOL_DATA[2]", f"LIN {pose(60, 0, 60)}", f"LIN {pose(60, 0, 0)}", CUT, f"LIN {pose(60, 90, 0)}", OFF,
+        f"LIN {pose(60, 90, 50)}", cell=CELL.replace("bases:", other),
+    )  # fmt: skip
+
+
+FURTHER: list[Case] = [
+    Case("entered from above, C_DIS 3", contour(SQUARE, "C_DIS", 3, "C_DIS")),
+    Case("entered in line, C_DIS 3", contour(SQUARE, "C_DIS", 3, "C_DIS", above=(-40, 0, 0))),
+    Case("left, C_DIS 3", contour(SQUARE, "C_DIS", 3, leave="C_DIS", above=SLANT)),
+    Case("entered and left, C_DIS 3", contour(SQUARE, "C_DIS", 3, "C_DIS", "C_DIS", above=SLANT)),
+    Case("one motion, entered and left", contour([(200, 0)], "", 3, "C_DIS", "C_DIS", above=SLANT)),
+    Case("closed, C_DIS 2", contour([(100, 0), (100, 60), (0, 60), (0, 0)], "C_DIS", 2)),
+    Case("corners, C_VEL", contour(SQUARE, "C_VEL", 0.5)),
+    Case("399 short motions", short_motions()),
+    Case("force steps between arcs, C_DIS", half_circle("C_DIS")),
+    Case("force steps between arcs, exact", half_circle("")),
+    Case("circle by CA 360", whole_circle()),
+    Case("corners, G64", blended("G64"), judged="position"),
+    Case("two tools", two_tools()),
+    *(Case(f"turned robot, track {a} to {b}", turned_track(a, b)) for a, b in ((900, 900), (800, 1200))),
+]  # fmt: skip
