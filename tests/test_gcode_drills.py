@@ -15,10 +15,10 @@ from gcode_writing import WRITING, assert_reads_as, free, random_plan, read, wri
 from postproc.base.document import apply
 from postproc.base.units import MM
 from postproc.languages.dialect import EditedTargets, Plan, Program, Role
-from postproc.languages.gcode import DIALECTS, LINUXCNC, GcodeDialect
+from postproc.languages.gcode import DIALECTS, GcodeDialect
 
 NAMES = {dialect.name: dialect for dialect in DIALECTS}
-FANUC, LINUX = NAMES["fanuc"], GcodeDialect(LINUXCNC)
+FANUC, LINUX = NAMES["fanuc"], NAMES["linuxcnc"]
 HEAD = "G21 G90 G17 T1 M6\nG0 X0 Y0 Z20\n"
 needs_rs274 = pytest.mark.skipif(RS274 is None, reason=MISSING)
 

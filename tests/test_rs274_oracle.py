@@ -17,13 +17,14 @@ import pytest
 
 from postproc.base.document import Document
 from postproc.base.geometry import on_arc
-from postproc.languages.gcode import LINUXCNC, GcodeDialect
+from postproc.languages.gcode import DIALECTS
 from postproc.toolpath import Kind
 
 RS274 = shutil.which("rs274")
 needs_rs274 = pytest.mark.skipif(
     RS274 is None, reason="rs274 is missing: install the package linuxcnc-uspace"
 )
+LINUXCNC = next(one for one in DIALECTS if one.name == "linuxcnc")
 CASES = Path(__file__).parent / "programs" / "linuxcnc"
 COUNT = int(os.environ.get("POSTPROC_RS274_PROGRAMS", "60"))
 NEAR = 1e-4 * (1 + 1e-6)
@@ -115,7 +116,7 @@ def agree(program: Path, folder: Path) -> int:
     canon = canonical(program, folder)
     if canon is None:
         return 0
-    path = GcodeDialect(LINUXCNC).read((Document(program, program.read_bytes()),)).toolpath
+    path = LINUXCNC.read((Document(program, program.read_bytes()),)).toolpath
     rows = [
         row
         for row in range(len(path))

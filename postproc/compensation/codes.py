@@ -60,17 +60,6 @@ CODES = define(
             action="Omit S and T in this target, or state the pose further from the axis angle.",
             example="T states A4 >= 0 and the corrected pose has A4 = -0.01 deg.",
         ),
-        "KIN013": Code(
-            "info",
-            "quadrants of confdata",
-            meaning="The corrected pose is across the border of a quadrant that cf1, cf4 or cf6 states.",
-            consequence=(
-                "The motion is corrected and confdata is kept. A control that supervises the configuration"
-                " (ConfL or ConfJ on) may stop before this motion."
-            ),
-            action="If the control stops there, switch ConfL off around this motion or change its confdata.",
-            example="cf4 is 0 and the corrected pose has axis 4 at -0.01 deg.",
-        ),
         "KIN008": Code(
             "warning",
             "axis near its limit",

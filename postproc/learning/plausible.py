@@ -218,7 +218,7 @@ def check_shift(part: MeasuredPart, distance: Floats) -> list[Finding]:
     if np.linalg.norm(shift) < SHIFTED or np.mean(rest < 0.5 * SHIFTED) < ALIKE:
         return []
     words = ", ".join(f"{axis} {one / MM:+.2f}" for axis, one in zip("XYZ", shift.tolist(), strict=True))
-    message = f"the points lie beside the surface of this program, all of them by the same shift: {words} mm"
+    message = f"all points are shifted against the surface of this program by {words} mm"
     help = "measure in the axes of the program's $BASE, or move the points: their origin is another one"
     return [Finding("LRN003", message, str(part.file), help=help)]
 

@@ -122,5 +122,16 @@ CODES = define(
             action="Check that the constant orientation is intended.",
             example="KRL: `$ORI_TYPE=#CONSTANT` with targets of different A, B, C.",
         ),
+        "KIN013": Code(
+            "info",
+            "quadrants of confdata",
+            meaning="The pose, as programmed or as corrected, is not in the quadrants that cf1, cf4 and cf6 state.",
+            consequence=(
+                "The motion is corrected and confdata is kept. A control that supervises the configuration"
+                " (ConfL or ConfJ on) may stop before this motion."
+            ),
+            action="If the control stops there, switch ConfL off around this motion or change its confdata.",
+            example="cf4 is 0 and the corrected pose has axis 4 at -0.01 deg.",
+        ),
     }
 )

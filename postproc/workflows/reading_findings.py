@@ -25,22 +25,27 @@ def reader_findings(program: Program, path: Toolpath) -> list[Finding]:
 
 
 def configuration_findings(program: Path, path: Toolpath, track: AxisTrack) -> list[Finding]:
-    """Where the stated configuration of a motion and the axes that bring the robot there disagree (KIN007)."""
+    """Where the stated configuration of a motion and the axes that bring the robot there disagree (KIN007, KIN013)."""
     # A path motion keeps the branch that the robot is in, whatever its target states.
     elsewhere = ~status_matches(path, track) & path.known & np.isin(path.kind, (Kind.LIN, Kind.CIRC))
+    turned = ~track.turn_matches
+    has_quadrants = "quadrants" in path.configuration.numbers
     findings = []
-    for mask, message in (
-        (~track.turn_matches & ~elsewhere, _turn_words(path)),
-        (elsewhere, "the stated configuration (S, cfx) is not the one in which the robot reaches this pose"),
+    for code, mask, message in (
+        ("KIN007", turned & (not has_quadrants), "the stated T (Turn) is not that of this pose"),
+        (
+            "KIN013",
+            turned & has_quadrants & ~elsewhere,
+            "the stated quadrants (cf1, cf4, cf6) are not those of this pose",
+        ),
+        (
+            "KIN007",
+            elsewhere,
+            "the stated configuration (S, cfx) is not the one in which the robot reaches this pose",
+        ),
     ):
         rows = np.flatnonzero(mask)
         if len(rows):
             more = f" ({len(rows)} motions, to line {path.line[rows[-1]]})" if len(rows) > 1 else ""
-            findings.append(Finding("KIN007", message + more, str(program), int(path.line[rows[0]])))
+            findings.append(Finding(code, message + more, str(program), int(path.line[rows[0]])))
     return findings
-
-
-def _turn_words(path: Toolpath) -> str:
-    if "quadrants" in path.configuration.numbers:
-        return "the stated quadrants (cf1, cf4, cf6) are not those of this pose"
-    return "the stated T (Turn) is not that of this pose"
