@@ -55,7 +55,7 @@ def process_forces(
     cutting &= ~free
     back = np.flatnonzero(cutting & (toolpath.spindle < 0))
     if len(back):
-        message = f"the spindle runs counter-clockwise in {len(back)} cutting motions"
+        message = f"the spindle rotates counter-clockwise in {len(back)} cutting motions"
         raise Refusal(Finding("FRC033", message, program, int(toolpath.line[back[0]])))
     _check_feed(operations, joined, cutting, toolpath, path, program)
     findings += _passed_over(operations, joined, cutting, toolpath, program)
