@@ -3,9 +3,9 @@
 Rotary axes A, B, C turn the tool against the part: R(A, B, C) = Rz(C) Ry(B) Rx(A) in the base's axes, and the tool
 is at R turned, with ``turned`` its orientation at A = B = C = 0; an axis that no block names stays at 0. That
 holds where X, Y, Z are the tool's tip (TCP modes); else the place of the tip and the orientation of the part are the
-machine's own, and only blocks with all rotary axes at 0 say where the tool is. Controls of robots take A, B, C as angles
-of the tool's frame itself (``Control.whole``). A vector, or angles A2= B2= C2=, say where the tool points in the programmed
-coordinates; they hold until another block states an orientation.
+machine's own, and only blocks with all rotary axes at 0 say where the tool is. Controls of robots take A, B, C as
+angles of the tool's frame itself (``Control.whole``). A vector, or angles A2= B2= C2=, say where the tool points in
+the programmed coordinates; they hold until another block states an orientation.
 
 Between two blocks rotary axes run linearly, as they do under G43.4, under ORIAXES and in the kinematics of LinuxCNC;
 what says a direction runs on a great circle (ORIVECT, ORIPLANE); angles of the tool's frame turn evenly about one axis.
