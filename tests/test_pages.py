@@ -495,7 +495,7 @@ def test_a_prediction_has_a_page(predicted):
 
 def test_viridis_rises_in_lightness():
     """So that the scale can be read without telling red from green, and on paper without colour."""
-    text = (FOLDER / "figures.js").read_text()
+    text = (FOLDER / "canvas.js").read_text()
     colours = re.findall(r"'#([0-9a-f]{6})'", text[text.index("VIRIDIS = [") :].partition("];")[0])
     channels = np.array([[int(c[i : i + 2], 16) / 255 for i in (0, 2, 4)] for c in colours])
     light = channels**2.2 @ [0.2126, 0.7152, 0.0722]

@@ -42,7 +42,7 @@ def rows(done):
 def test_it_asks_for_nothing_and_complains_of_nothing(window, done):
     shown = window(done / "part.report.html")
     page = shown.page
-    for selector in ("#space", "#error", "#correction"):
+    for selector in ("#view3d", "#error", "#correction"):
         page.locator(selector).hover()
         page.locator(selector).click()
     page.keyboard.press("ArrowRight")
@@ -77,7 +77,7 @@ def test_a_script_that_got_in_would_not_run(window, done, tmp_path):
 
 def test_the_path_is_drawn(window, done):
     shown = window(done / "part.report.html")
-    drawn = shown.pixels("#space")
+    drawn = shown.pixels("#view3d")
     ground = drawn[5, 5]
     ink = np.abs(drawn - ground).sum(axis=2) > 60
     assert ink.sum() > 3000
@@ -89,30 +89,30 @@ def test_the_path_is_drawn(window, done):
         lambda page: page.check("#deflected"),
         lambda page: page.click("text=top"),
     ):
-        before = shown.pixels("#space")
+        before = shown.pixels("#view3d")
         act(shown.page)
-        assert (np.abs(shown.pixels("#space") - before).sum(axis=2) > 60).sum() > 50
+        assert (np.abs(shown.pixels("#view3d") - before).sum(axis=2) > 60).sum() > 50
 
 
 def test_turning_and_zooming(window, done):
     shown = window(done / "part.report.html")
     page = shown.page
-    page.locator("#space").scroll_into_view_if_needed()
-    box = page.locator("#space").bounding_box()
+    page.locator("#view3d").scroll_into_view_if_needed()
+    box = page.locator("#view3d").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    first = shown.pixels("#space")
+    first = shown.pixels("#view3d")
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x + 120, y + 40, steps=5)
     page.mouse.up()
-    turned = shown.pixels("#space")
+    turned = shown.pixels("#view3d")
     page.mouse.wheel(0, -400)
     page.wait_for_timeout(300)
-    zoomed = shown.pixels("#space")
+    zoomed = shown.pixels("#view3d")
     page.keyboard.press("0")
     page.keyboard.press("ArrowLeft")
     page.wait_for_timeout(300)
-    keyed = shown.pixels("#space")
+    keyed = shown.pixels("#view3d")
     for one, other in ((first, turned), (turned, zoomed), (zoomed, keyed)):
         assert (np.abs(one - other).sum(axis=2) > 60).sum() > 200
 
@@ -138,8 +138,8 @@ def test_hover_tells_line_and_figures(window, done, rows):
     """Wherever the pointer meets the path, what is told stands so in the corrections."""
     shown = window(done / "part.report.html")
     page = shown.page
-    page.locator("#space").scroll_into_view_if_needed()
-    box = page.locator("#space").bounding_box()
+    page.locator("#view3d").scroll_into_view_if_needed()
+    box = page.locator("#view3d").bounding_box()
     told = {}
     for x in np.arange(box["x"] + 20, box["x"] + box["width"] - 20, 22):
         for y in np.arange(box["y"] + 20, min(box["y"] + box["height"], 880) - 20, 22):
@@ -178,7 +178,7 @@ def test_without_a_mouse(window, done, rows):
     assert page.input_value("#line") == str(line())
     page.keyboard.press("End")
     assert line() == order[-1]
-    page.focus("#space")
+    page.focus("#view3d")
     page.keyboard.press("p")
     assert line() == order[-2]
     page.fill("#line", str(order[2]))
@@ -197,7 +197,7 @@ def test_without_a_mouse(window, done, rows):
         if reached and at == reached[0]:
             break
         reached.append(at)
-    wanted = ["quantity", "arrows", "space", "motion", "line", "error", "correction"]
+    wanted = ["quantity", "arrows", "view3d", "motion", "line", "error", "correction"]
     assert [name for name in reached if name in wanted] == wanted
 
 
@@ -206,7 +206,7 @@ def test_light_and_dark(window, done):
     means = {}
     for scheme in ("light", "dark"):
         shown = window(done / "part.report.html", color_scheme=scheme)
-        means[scheme] = shown.pixels("#space")[5, 5].mean()
+        means[scheme] = shown.pixels("#view3d")[5, 5].mean()
         assert shown.pixels("#error")[2, 100].mean() == pytest.approx(means[scheme], abs=6)
         for selector in (
             "body",
@@ -290,7 +290,7 @@ def test_programs_with_nothing_to_show_have_a_page_too(window, tmp_path, lines):
     (tmp_path / "part.src").write_text("\n".join(lines) + "\n")
     compensate(Request(tmp_path / "part.src", force="0,0,0"))
     shown = window(tmp_path / "compensated" / "part.report.html")
-    shown.page.locator("#space").hover()
+    shown.page.locator("#view3d").hover()
     shown.page.locator("#error").click()
     shown.page.keyboard.press("ArrowRight")
     assert shown.complaints == []

@@ -78,7 +78,7 @@ def test_narrow_and_wide_light_and_dark(window, pages, kind):
         assert shown.page.evaluate("document.documentElement.scrollWidth") <= wide
         assert shown.violations() == []
         assert shown.complaints == []
-        for selector in ("#space", "#error", "#correction", ".drawn img"):
+        for selector in ("#view3d", "#error", "#correction", ".drawn img"):
             if shown.page.locator(selector).count():
                 drawn = shown.pixels(selector)
                 corner = drawn[3:9, 3:9].mean()

@@ -1,6 +1,6 @@
 """YAML files read strictly: every mistake is reported with file, line, key and what is allowed.
 
-PyYAML composes the nodes (safe: tags and aliases are refused, nothing is constructed); ``YamlSection`` hands out
+PyYAML composes the nodes (safe: tags and aliases are refused, nothing is constructed); ``YamlSection`` returns
 checked values.  Numbers, ``null`` and ``true`` follow YAML 1.2, so ``1e-6`` is a number and ``yes`` a word.
 """
 

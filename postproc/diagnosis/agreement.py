@@ -1,4 +1,4 @@
-"""What explanations that the readings do not tell apart predict over the workspace: whether it matters for cutting."""
+"""What explanations that the readings do not distinguish predict over the workspace: whether it matters for cutting."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ class Attribution:
         return self.explained.surface
 
     def is_unsure(self, cause: Cause) -> bool:
-        """Whether the part does not tell it from other effects: it is applied at this place only."""
+        """Whether the part does not distinguish it from other effects: it is applied at this place only."""
         return bool(self.stand_in) and self.stand_in in (cause.place, cause.name)
 
     @cached_property

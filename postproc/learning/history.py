@@ -1,8 +1,8 @@
 """The record of the parts that were learnt from: which files, what cut them, and what was promised of the next one.
 
 A small JSON file beside the cell.  It names measured parts and programs by file and SHA-256 and holds no deviation:
-those are read from their files again.  A digest of its own content tells a damaged record; digests of what predicts the
-program tell one of another program, cell or robot.
+those are read from their files again.  A digest of its own content identifies a damaged record; digests of what
+predicts the program distinguish one of another program, cell or robot.
 """
 
 from __future__ import annotations

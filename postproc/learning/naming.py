@@ -30,7 +30,7 @@ NAMED = float(np.log(100.0))
 for."""
 
 SURE = 0.95
-"""Probability of an effect that is named among all, and of a set of effects of which the part does not tell which."""
+"""Probability of an effect that is named among all, and of a set of effects which the part does not distinguish."""
 
 REFINED = 4
 """The likeliest effects are compared with the smooth error that fits best beside each."""
@@ -74,7 +74,7 @@ def weigh_effects(
             own = everything.part(np.flatnonzero(points))
             bare = own, without_field(own)
             options += [(points, start) for start in bare]
-            # points that are no outliers without the effect either tell nothing of it
+            # points that are no outliers without the effect have no information on it either
             with_them = max(one.evidence for one in bare) + _outside(points)
             present[effect.name] = max(present[effect.name], with_them)
         found.append(max((weighed(effect, *one) for one in options), key=lambda one: one.gain))

@@ -1,4 +1,4 @@
-"""The points of a part worth measuring: those that tell most of the errors of the whole surface.
+"""The points of a part worth measuring: those with the most information on the errors of the whole surface.
 
 Errors f of M points have the covariance K = S D^2 S^T + field before a measurement; a probe reads f with its scatter,
 after an alignment that adds free columns A.  Points are chosen one after another, each the one that takes most from the

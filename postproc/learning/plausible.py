@@ -27,7 +27,7 @@ OFFSET = 0.1 * MM
 """[m] An offset of all deviations that no tool has."""
 
 QUIET, FEW = 0.5, 12
-"""Deviations of so many times the stated scatter are too small; fewer points tell nothing of it."""
+"""Deviations of so many times the stated scatter are too small; fewer points do not show it."""
 
 FAR_OUT = 5.0
 """Standard deviations before the measurement beyond which a cause is no longer one."""
@@ -45,7 +45,7 @@ COPIED, SAME = 0.6, 5e-6
 """Share of points that lie off the nominal surface by their own deviation, to [m]."""
 
 FEW_BESIDE = 3
-"""Points that no tool touches, from which on they may tell that all of them are shifted."""
+"""Points that no tool touches, from which on they may show that all of them are shifted."""
 
 SHIFTED, ALIKE = 0.06 * MM, 0.9
 """[m] A shift of all points beyond chords and roundings; share of the points that lie as far off as it says."""
@@ -96,7 +96,7 @@ def check_deviations(
     look: FirstLook, feature: Sequence[str], original: bool, file: str, several: bool = False
 ) -> list[Finding]:
     """Whether the deviations are too small for the probe, or far likelier with the other sign, exchanged between two of
-    the features (K,), or of a compensated program where the ``original`` is stated; ``several``: other parts tell of
+    the features (K,), or of a compensated program where the ``original`` is stated; ``several``: other parts show
     the causes too, which are not known here."""
     enough = EXCHANGED if several else LIKELIER
     quiet = _check_size(look, file)

@@ -1,4 +1,4 @@
-"""What one part does not tell: causes that keep what was known before, and products of which only one is seen."""
+"""What one part does not determine: causes that keep what was known before, and products of which only one is seen."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def common_scale(result: Attribution) -> tuple[float, float] | None:
 
 
 def indistinct(result: Attribution) -> str:
-    """What this part does not tell, in words; "" where it tells everything."""
+    """What this part does not determine, in words; "" where it determines everything."""
     words = []
     both = common_scale(result)
     if both is not None and both[1] < TWINS * both[0]:

@@ -14,7 +14,7 @@ from postproc.robot.chain import Chain, add_to_leaders, generalized_force
 from postproc.robot.description import Robot, Value
 
 STILL = 1e-9
-"""[rad, m] A motor that moves less stands still: it is the rounding of an inverse kinematics, not a motion."""
+"""[rad, m] A motor that moves less is at rest: it is the rounding of an inverse kinematics, not a motion."""
 
 STANDARD_GRAVITY = 9.80665
 """[m/s2]"""

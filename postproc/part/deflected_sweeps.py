@@ -39,8 +39,8 @@ def deflect(
         for weight in (0.25, 0.5, 0.75):
             here = _moved(motion, share, owner, part @ [1 - weight, weight], displacement)
             middle = here if weight == 0.5 else middle
-            bent = here - (1 - weight) * ends[0] - weight * ends[1]
-            off = np.maximum(off, lengths(bent[:, :3]) + lever * lengths(bent[:, 3:]))
+            deviation = here - (1 - weight) * ends[0] - weight * ends[1]
+            off = np.maximum(off, lengths(deviation[:, :3]) + lever * lengths(deviation[:, 3:]))
         width = (part[:, 1] - part[:, 0]) * long[owner]
         split = (off > EVEN) & (width > _SHORTEST) & (halving < _HALVINGS)
         done.append((owner[~split], part[~split], ends[0][~split], ends[1][~split]))

@@ -115,7 +115,7 @@ class Surface:
     """K points of a part.
 
     points, normals (K, 3) [m]: in the axes of the stock, normals point out of the material; sweep (K,): whose surface
-    it is, -1 for that of the blank and within 1 um of an edge; area (K,) [m2] that each stands for; spacing [m] of the
+    it is, -1 for that of the blank and within 1 um of an edge; area (K,) [m2] that each represents; spacing [m] of the
     grid.  vertices (V, 3) [m], faces (F, 3): the mesh; vertex (K, 4): the vertices around each point.
     """
 

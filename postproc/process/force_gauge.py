@@ -26,7 +26,7 @@ def checked_gauge(
     """The readings (M, 6), ``channels`` (M, 6) [N, N m] without the mean of those ``in_air`` (M,) where ``offset`` asks
     for it.
 
-    Tells what is seen of offset and rails.  Refusal FRC020 where an offset is to be taken off and nothing is in air.
+    Reports offset and rails.  Refusal FRC020 where an offset is to be taken off and nothing is in air.
     """
     findings += _rails(table, channels)
     if not np.any(in_air):

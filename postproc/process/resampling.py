@@ -14,7 +14,7 @@ FEW = 3
 """Readings that half a motion needs for a force that changes along it."""
 
 AROUND = 10
-"""Readings before and after that tell the scatter of a motion that has few of its own."""
+"""Readings before and after that show the scatter of a motion that has few of its own."""
 
 CLEAR = 3.0
 """Means differ where they do by more than so many standard errors."""

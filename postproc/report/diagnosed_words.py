@@ -31,7 +31,7 @@ OVERSTATED = 0.5
 """Variance over the stated one below which readings scatter by less than is stated."""
 
 WIDE = 1.5
-"""Plausible sizes: an interval that is wider says that the readings do not tell a parameter from others."""
+"""Plausible sizes: an interval that is wider says that the readings do not distinguish a parameter from others."""
 
 FAR_OFF = 1.5
 """Times the scatter: where more is left, yet no lack of fit, a few readings lie far off."""

@@ -148,7 +148,7 @@ class Learned(Result):
 
     def causes(self) -> list[tuple[Cause, float, float]]:
         """Each cause with its value and its standard deviation after the measurement, but those of an effect that the
-        part does not tell from others."""
+        part does not distinguish from others."""
         result = self.attribution
         every = zip(result.causes, result.x.tolist(), result.deviations.tolist(), strict=True)
         return [one for one in every if not result.is_unsure(one[0])]

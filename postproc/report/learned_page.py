@@ -119,7 +119,7 @@ def _worst(learned: Learned) -> Table:
 
 
 def _notes(learned: Learned) -> Iterator[str]:
-    """What this part does not tell."""
+    """What this part does not determine."""
     words = indistinct(learned.attribution)
     if words:
         yield f"{words[0].upper()}{words[1:]}."

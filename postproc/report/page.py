@@ -46,7 +46,7 @@ FOLDER = Path(__file__).parent / "html"
 FINDINGS = 300
 """A page shows so many findings at most; all are in the JSON."""
 
-SCRIPTS = ("figures.js", "space.js", "hands.js", "chart.js", "listing.js", "program.js", "tables.js")
+SCRIPTS = ("canvas.js", "view3d.js", "view3d_input.js", "chart.js", "listing.js", "program.js", "tables.js")
 PART = ("robot.js", "part.js", "play.js")
 TABLES = ("tables.js",)
 """Scripts of a page of a program, with a part, and of every other page."""

@@ -10,7 +10,7 @@ from postproc.base.arrays import Bools, Floats, Ints
 from postproc.compensation.correct import CorrectionResult
 
 PLACES = 12
-"""Worst places that the page tells, with their text."""
+"""Worst places on the page, with their text."""
 
 SHOWN = 50_000
 """Motions that the figures of a page show at most."""

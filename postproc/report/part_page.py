@@ -19,7 +19,7 @@ from postproc.report.part_report import SIDES, forces_sentence, side_sentence
 WIDE, HIGH = 640, 400
 """Pixels of a static picture."""
 
-_BESIDE, _PITCH = 0.66, 0.6  # rad: the reader stands opposite to the robot, to one side of it and above
+_BESIDE, _PITCH = 0.66, 0.6  # rad: the reader is opposite to the robot, to one side of it and above
 _LIGHT = np.array([0.3, 0.5, 0.8]) / np.linalg.norm([0.3, 0.5, 0.8])
 _EACH = (
     np.array([[2, 1, 1], [1, 2, 1], [1, 1, 2], [4, 0, 0], [0, 4, 0], [0, 0, 4]]) / 4
@@ -63,7 +63,7 @@ def oblique_yaw(part: PartError, robot: Sequence[float]) -> float:
 
 def part_data(part: PartError, scene: Mapping[str, Any]) -> dict[str, object]:
     """What ``part.js`` draws: places in 65,535ths of the extent, errors in 32,767ths of the range [mm]; ``scene``: what
-    stands around the part (``part_scene``)."""
+    is around the part (``part_scene``)."""
     vertices, tolerance = part.surface.vertices, part.figures.tolerance
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     extent = np.maximum(high - low, 1e-9)

@@ -1,4 +1,4 @@
-"""What stands around the part in the view of the page: robot, cutters, forces' places and the path of the tool."""
+"""What is around the part in the view of the page: robot, cutters, forces' places and the path of the tool."""
 
 from __future__ import annotations
 

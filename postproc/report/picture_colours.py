@@ -41,7 +41,7 @@ def follow_colours(svg: bytes) -> bytes:
 
 
 def dark_colour(colour: Colour) -> Colour:
-    """What stands for a colour of a light page on a dark one."""
+    """What replaces a colour of a light page on a dark one."""
     if _is_grey(colour):
         share = sum(colour) / 765.0
         return _mixed(INK, GROUND, share)

@@ -29,7 +29,7 @@ FINE_STEP = 0.005
 """The same where axes turn far."""
 
 FAR = 0.3
-"""A target farther than this from where ``near`` stands is another posture: any branch will do."""
+"""A target farther than this from ``near`` is another posture: any branch will do."""
 
 _CHUNK = 4096
 _WEIGHT = 1e-16

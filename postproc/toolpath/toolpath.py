@@ -78,7 +78,8 @@ class Toolpath(MotionColumns):
     has stated them yet, ``COMPUTED`` or ``LOST`` where they are not known.
     ``feed`` (N,) [m/s]: NaN where it is not known.
     ``spindle`` (N,) [rad/s]: the speed of the spindle, as the program states it: below zero where it turns
-    counter-clockwise (-inf at a speed that is not known), 0 where it stands; NaN where nothing is stated, or it varies.
+    counter-clockwise (-inf at a speed that is not known), 0 where it is stopped; NaN where nothing is stated, or it
+    varies.
     ``inverse_time_feed`` (N,): the text gives the time that the motion takes, its feed follows from its length (G93).
     ``base``, ``tool`` (N,): index into ``frames``, -1 where it is not known.
     ``line`` (N,): from 1.

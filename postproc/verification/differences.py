@@ -22,7 +22,7 @@ SAME_EXTERNAL = 2e-3
 """External axes that are, in mm and deg as the text has them."""
 
 NEAR = 0.05 * MM
-"""How far from a point of the original, along the path, the motion may end that stands for it."""
+"""How far from a point of the original, along the path, the motion may end that represents it."""
 
 AGAINST = 5e-6
 """[m] A motion that leads against the feed by less does so by digits."""

@@ -24,7 +24,7 @@ SPAN, BLOCK = 60.0 * MM, 128
 """Path of the commands that are looked at together, and how many they are at most."""
 
 LEAST_STEP = 0.02 * MM
-"""Path that a command stands for, at least: where the tool only turns, its distance still counts."""
+"""Path that a command represents, at least: where the tool only turns, its distance still counts."""
 
 
 def track_commands(grid: PathGrid, stretch: Ints, command: Floats) -> tuple[Ints, Floats]:

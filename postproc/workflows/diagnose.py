@@ -57,7 +57,7 @@ WILD, FEW = 10.0, 0.05
 """Standard deviations from which on a reading is an accident, and the share of all that may be."""
 
 TRIED = 2
-"""Explanations of a set that the first is told from."""
+"""Explanations of a set that the first is distinguished from."""
 
 WIDER = 0.05
 """Share of the range of an axis by which next poses may leave what was measured."""

@@ -32,7 +32,7 @@ from postproc.workflows.preparation import Stage, silent
 from postproc.workflows.robot_files import new_robot_file
 
 Progress = Callable[[str, int, int], None]
-"""Is told the name of a stage, how many of its steps are done, and how many there are."""
+"""Receives the name of a stage, how many of its steps are done, and how many there are."""
 
 FEW_POSES = 60
 """Up to so many poses intervals are checked by a bootstrap, unless it is asked for or not."""
@@ -43,7 +43,7 @@ ROUNDS = 5
 """Of looking for outliers, each without those found before."""
 
 PULLED = 3.0
-"""Standard deviations of its prior by which the readings must move a parameter for that to be told."""
+"""Standard deviations of its prior by which the readings must move a parameter for that to be reported."""
 
 SHOWN = 10
 

@@ -1,4 +1,4 @@
-"""What else a search for places tells: regret, each freedom alone, the score over x and y."""
+"""What else a search for places reports: regret, each freedom alone, the score over x and y."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ from postproc.workflows.place_motions import base_of_cuts, build_motions, cell_o
 from postproc.workflows.preparation import Prepared, Request, prepare, read_program
 
 PROBE = 1 * DEG
-"""Turn of the part by which forces in world axes are told from others."""
+"""Turn of the part by which forces in world axes are distinguished from others."""
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ from postproc.workflows.correction_mode import corrected_model, mode_findings, t
 from postproc.workflows.reading_findings import configuration_findings, reader_findings
 
 Stage = Callable[[str], None]
-"""Is told the name of each stage as it starts."""
+"""Receives the name of each stage as it starts."""
 
 
 @dataclass(frozen=True)

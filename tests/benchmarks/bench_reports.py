@@ -38,8 +38,8 @@ def test_opening(page_of_many, chromium):
     page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
     drawn = time.monotonic() - begin
     paint = page.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime") / 1e3
-    page.locator("#space").scroll_into_view_if_needed()
-    box = page.locator("#space").bounding_box()
+    page.locator("#view3d").scroll_into_view_if_needed()
+    box = page.locator("#view3d").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.mouse.move(x, y)
     page.mouse.down()

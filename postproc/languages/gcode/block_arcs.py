@@ -19,9 +19,9 @@ def given_by_point(given: BlockWords, rows: Ints) -> Bools:
 
 
 def arcs_of_blocks(
-    given: BlockWords, rows: Ints, start: Floats, end: Floats, plane: Ints, bent: Bools
+    given: BlockWords, rows: Ints, start: Floats, end: Floats, plane: Ints, is_arc: Bools
 ) -> ArcGeometry:
-    """The arcs among the motions in the blocks ``rows`` (N,), which are ``bent`` (N,), from ``start`` to ``end`` (N, 6)
+    """The arcs among the motions in the blocks ``rows`` (N,), where ``is_arc`` (N,), from ``start`` to ``end`` (N, 6)
     [m, rad] in ``plane`` (N,); NaN for all others."""
     n = len(rows)
     result = ArcGeometry(
@@ -33,7 +33,10 @@ def arcs_of_blocks(
     if word in given.columns:
         turns = np.nan_to_num(given.number(word)[rows] - usual)
         turns[turns % 1 != 0] = np.nan
-    for some, keys in ((bent & ~between, tuple(key(letter) for letter in "IJK")), (bent & between, THROUGH)):
+    for some, keys in (
+        (is_arc & ~between, tuple(key(letter) for letter in "IJK")),
+        (is_arc & between, THROUGH),
+    ):
         if not some.any():
             continue
         at = rows[some]

@@ -69,7 +69,7 @@ class What:
 
 
 class Reasons:
-    """What left coordinates unknown: numbers of texts, -1 for none; of every block the one that was told last."""
+    """What left coordinates unknown: numbers of texts, -1 for none; of every block the last one."""
 
     def __init__(self, count: int) -> None:
         self.texts: list[str] = []
@@ -198,7 +198,7 @@ class BlockWords:
 
     @cached_property
     def twice(self) -> Bools:
-        """(B,) blocks in which a word stands twice."""
+        """(B,) blocks in which a word is repeated."""
         mask = np.zeros(len(self), np.bool_)
         for one in self.columns:
             block = self.words(one).block
@@ -214,7 +214,7 @@ class BlockWords:
 
     @cached_property
     def axis(self) -> Bools:
-        """(B,) words of axes, or what stands for them."""
+        """(B,) words of axes, or what takes their place."""
         second = () if self.control.further else SECOND
         return self.has(*AXES, *second) | self.noted("axis", "polar")
 

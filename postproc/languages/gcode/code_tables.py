@@ -70,7 +70,7 @@ _COMMON = _codes(
     (Group.ONCE, Once.SHIFT, (92,)),
     (Group.ONCE, Once.UNSHIFT, (92.1,)),
     (Group.NONE, 0, (9, 62, 63, 103, 187)),
-    # Codes of Fanuc that no other meaning in LinuxCNC stands against.
+    # Codes of Fanuc that have no other meaning in LinuxCNC.
     (Group.TURNED, 1, (68, 68.1, 68.2, 68.3, 68.4, 254)),
     (Group.TURNED, 0, (69, 69.1, 255)),
     (Group.SCALED, 1, (51,)),

@@ -37,7 +37,7 @@ class Group(IntEnum):
     DIAMETER = 17  # 0; else X is a diameter
     SPINDLE = 18  # 0 speed, 1 constant surface speed: F per revolution is then unknown
     MACRO = 19  # 0; 1 every block calls a macro (G66), 2 a drilling cycle (MCALL CYCLE81)
-    FEED_UNITS = 24  # 0 mm, 1 inch: of F, where a control tells it apart from that of coordinates
+    FEED_UNITS = 24  # 0 mm, 1 inch: of F, where a control distinguishes it from that of coordinates
     FOREIGN = 20  # 0; else words are no coordinates of the base in this mode (#MCS ON, TRANSMIT)
     AXIAL = 21  # 0; else targets are axis positions, or reached as the axes go (PTP)
     ONCE = 22  # Once

@@ -256,7 +256,7 @@ def locked_rows(
     refused = collector.why >= 0
     if refused.any():
         partial = ~built.sets.all(axis=1)
-        # Orientation words are inherited as well; an arc starts there, and is bent by where it starts.
+        # Orientation words are inherited as well; an arc starts there, and its centre depends on where it starts.
         partial |= ~built.turned | ~np.isin(built.kind, (Kind.LIN, Kind.PTP))
         reaching = modal.has(Once.HOME, Once.MACHINE)[rows]
         building = np.flatnonzero(refused & partial & ~reaching)

@@ -98,11 +98,11 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
     anywhere = cycle & (given.modal.force[Group.PLANE] < 0)
     placed &= ~anywhere[:, None]
     latest = np.maximum.accumulate(np.where(placed, np.arange(n)[:, None], -1), axis=0)
-    doubts = np.cumsum(anywhere)
+    uncertain = np.cumsum(anywhere)
     lost = np.cumsum(leaves_unknown(given, lengths) | anywhere)
     # A cycle that says nothing of R, G98, G99 and the frame ends as the one before it.
     says = has_plane[rows] | ~absolute[rows] | (given.move[rows - 1] != Move.CYCLE)
-    for state in (axis, frame, back, doubts):
+    for state in (axis, frame, back, uncertain):
         says[1:] |= state[rows[1:]] != state[rows[:-1]]
     says[0] = True
     heads = np.flatnonzero(says)
@@ -118,7 +118,7 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
             at, origin = max(at, drill), _level_from(given, row, cycle, source)
             same = at >= 0 and frame[at] == frame[row] and lost[at] == lost[row]
             at_r, before = np.nan, there if same else np.nan
-        elif frame[row] != frame[last] or axis[row] != axis[last] or doubts[row] != doubts[last]:
+        elif frame[row] != frame[last] or axis[row] != axis[last] or uncertain[row] != uncertain[last]:
             # LinuxCNC goes back to the number of the other axis
             at_r, before = np.nan, np.nan
         last = drilled[axis[row]] = tail

@@ -46,10 +46,10 @@ def diagnostics(
     findings: list[Finding] = []
     live = modal.flow.tape & (modal.flow.reason != FlowReason.ENDED)
 
-    def tell(where: Bools, code: str, message: str) -> None:
-        tell_at(np.flatnonzero(where), code, message)
+    def add(where: Bools, code: str, message: str) -> None:
+        add_at(np.flatnonzero(where), code, message)
 
-    def tell_at(at: Ints, code: str, message: str) -> None:
+    def add_at(at: Ints, code: str, message: str) -> None:
         at = at[live[at]]
         if len(at):
             many = (
@@ -64,32 +64,32 @@ def diagnostics(
     text = given.noted("unknown") & ~motion
     if text.any():
         said = next(note.text for note in given.source.notes if note.kind == "unknown" and text[note.block])
-        tell(text, "GCO001", f"{said[:60]!r} is not understood")
+        add(text, "GCO001", f"{said[:60]!r} is not understood")
     strange = modal.unknown_codes.block[~motion[modal.unknown_codes.block] & live[modal.unknown_codes.block]]
     codes = np.nan_to_num(modal.unknown_codes.last(strange), nan=-1.0)
     for value in np.unique(codes)[:100].tolist():
-        tell_at(strange[codes == value], "GCO001", f"{code_name(value)} is not known here")
-    tell(modal.unused & ~motion, "GCO001", UNUSED)
+        add_at(strange[codes == value], "GCO001", f"{code_name(value)} is not known here")
+    add(modal.unused & ~motion, "GCO001", UNUSED)
     probing = modal.has(Once.PROBE) & ~motion
-    tell(probing, "GCO001", "the block is a probing move without axes")
+    add(probing, "GCO001", "the block is a probing move without axes")
     calls, m = none.copy(), given.words(key("M"))
     calls[m.block[np.isin(m.value, CALLS)]] = True
     calls |= modal.has(Once.CALL) | given.noted("call") | given.has(*given.control.calls)
-    tell(calls & ~modal.flow.called, "GCO007", "the block calls code that is not read")
-    tell(given.noted("cycle"), "GCO008", "the block calls a cycle of the control")
+    add(calls & ~modal.flow.called, "GCO007", "the block calls code that is not read")
+    add(given.noted("cycle"), "GCO008", "the block calls a cycle of the control")
     strange_m = ~np.isin(m.value, KNOWN_M) & live[m.block]
     if strange_m.any():
         names = [f"M{value:g}" for value in np.unique(m.value[strange_m & np.isfinite(m.value)]).tolist()]
         shown = ", ".join([*names[:8], *(["..."] if len(names) > 8 else [])]) or "an M code that is computed"
         verb = "is" if len(names) < 2 else "are"
-        tell_at(
+        add_at(
             np.unique(m.block[strange_m])[:1],
             "GCO028",
             f"{shown} {verb} not known here; it is assumed that no axis moves",
         )
     setting = modal.has(Once.SETTING) & given.has(*AXES, key("L"), key("P"), key("R"))
-    tell(setting, "GCO024", "the program writes offsets or tools")
-    tell(
+    add(setting, "GCO024", "the program writes offsets or tools")
+    add(
         given.noted("base"),
         "GCO024",
         "the program writes a work offset; the cell's base of its number is used",
@@ -99,7 +99,7 @@ def diagnostics(
         if note.kind == "tool":
             named_tools.setdefault(note.text, []).append(note.block)
     for name, at in named_tools.items():
-        tell_at(np.unique(at), "SIN001", name)
+        add_at(np.unique(at), "SIN001", name)
     if not len(rows):
         return findings
     uncertain = np.isin(modal.flow.reason, (FlowReason.DELETED, FlowReason.FLOW))
@@ -107,25 +107,25 @@ def diagnostics(
     after = rows[(rows > ends[0]) & (modal.flow.reason[rows] == FlowReason.NONE)] if len(ends) else ends
     if len(after):
         lines = f"lines {blocks.line[after[0]]} to {blocks.line[after[-1]]}"
-        tell_at(ends[:1], "GCO030", f"the program may end here: the motions in {lines} may not run")
+        add_at(ends[:1], "GCO030", f"the program may end here: the motions in {lines} may not run")
     first = none.copy()
     first[rows[0]] = True
     if not (modal.units & modal.flow.tape).any():
-        tell(first, "GCO020", "no code selects mm or inch; mm is assumed")
+        add(first, "GCO020", "no code selects mm or inch; mm is assumed")
     if not named:
-        tell(first, "GCO021", "the program names no tool; tool 1 of the cell is assumed")
+        add(first, "GCO021", "the program names no tool; tool 1 of the cell is assumed")
     if given.integers.message:
         whole = none.copy()
         hows = np.stack([given.how(axis) for axis in AXES[:3]], axis=1) == How.INTEGER
         values = np.stack([given.number(axis) for axis in AXES[:3]], axis=1)
         whole[rows] = (hows & (values != 0))[rows].any(axis=1)
-        tell(whole, "GCO027", given.integers.message)
+        add(whole, "GCO027", given.integers.message)
     if settings.integer_words == "um" and not given.control.increments:
         whole = none.copy()
         hows = np.stack([given.how(axis) for axis in AXES[:3]], axis=1) == How.INTEGER
         whole[rows] = hows[rows].any(axis=1)
-        tell(whole, "GCO022", f"words without a decimal point are mm or inch in {given.control.name}")
+        add(whole, "GCO022", f"words without a decimal point are mm or inch in {given.control.name}")
     height = given.number(key("H"))
     other = (height > 0) & (modal.force[Group.LENGTH] == 1) & (height != loaded) & (loaded > 0)
-    tell(other, "GCO023", "H has another number than the tool; the length of the cell's tool is used")
+    add(other, "GCO023", "H has another number than the tool; the length of the cell's tool is used")
     return findings

@@ -57,10 +57,10 @@ class GcodeMotions:
         sense = np.sign(np.linalg.det(turn))[:, None]
         normal = (turn @ arcs.normal[..., None])[..., 0] * sense
         step = end[:, :3] - start[:, :3]
-        bent = np.isfinite(arcs.sweep)
-        along = np.einsum("ij,ij->i", step, np.where(bent[:, None], arcs.normal, 0.0))
+        is_arc = np.isfinite(arcs.sweep)
+        along = np.einsum("ij,ij->i", step, np.where(is_arc[:, None], arcs.normal, 0.0))
         radius = np.linalg.norm(start[:, :3] - arcs.centre, axis=1)
-        length = np.where(bent, np.hypot(radius * arcs.sweep, along), np.linalg.norm(step, axis=1))
+        length = np.where(is_arc, np.hypot(radius * arcs.sweep, along), np.linalg.norm(step, axis=1))
         return GcodeMotions(
             block,
             move,

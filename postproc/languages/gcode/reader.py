@@ -253,7 +253,7 @@ def _followed(
     turned = None if settings.orientation is None else rotation_from_abc(settings.orientation)
     events = _events(given)
     trace = Trace(offsets.start(), events, _change(given, events), _start(settings))
-    feeds, stands, away, reasons = (
+    feeds, tool_orientations, away, reasons = (
         Feeds(given),
         ToolOrientations(given, turned),
         tilted(given),
@@ -278,7 +278,7 @@ def _followed(
         )
         where = trace.follow(way, start)
         holes = drills.part(start, stop)
-        moves = _motions(here, where, trace, own, stands, holes)
+        moves = _motions(here, where, trace, own, tool_orientations, holes)
         differing += int((moves.arcs.wrong == 3).sum())
         part = collector.part(slice(low, high))
         cutting = np.isin(moves.kind, (Kind.LIN, Kind.CIRC)) & lengths.off[rows[low:high]]
@@ -297,7 +297,9 @@ def _followed(
         np.array([frame.shift[:3] for frame in trace.frames]),
     )
     levels = np.unique(ends.source[np.isfinite(drills.depth) & (ends.source >= 0)])
-    return FollowedMotions(found, built, frames, tuple(stands.orientations), collector, differing, levels)
+    return FollowedMotions(
+        found, built, frames, tuple(tool_orientations.orientations), collector, differing, levels
+    )
 
 
 def _columns(
@@ -400,20 +402,20 @@ def _motions(
     where: Positions,
     trace: Trace,
     rows: Ints,
-    stands: ToolOrientations,
+    tool_orientations: ToolOrientations,
     holes: DrillCycles,
 ) -> GcodeMotions:
     start, end = where.start[rows], where.end[rows]
     force, move = given.modal.force, given.move[rows]
     plane = force[Group.PLANE][rows]
-    bent = np.isin(move, (Move.CLOCKWISE, Move.COUNTER, Move.THROUGH)) & ~given.machine[rows]
-    desired_path = arcs_of_blocks(given, rows, start, end, plane, bent)
+    is_arc = np.isin(move, (Move.CLOCKWISE, Move.COUNTER, Move.THROUGH)) & ~given.machine[rows]
+    desired_path = arcs_of_blocks(given, rows, start, end, plane, is_arc)
     kind = KINDS[move]
     kind[given.modal.has(Once.HOME)[rows]] = Kind.PTP
     kind[given.modal.has(Once.PROBE)[rows]] = Kind.LIN
     kind[force[Group.AXIAL][rows] != 0] = Kind.PTP
     kind[given.modal.unknown[rows]] = Kind.OTHER
-    pose = stands.of(trace, where, rows, given.start, kind == Kind.PTP)
+    pose = tool_orientations.of(trace, where, rows, given.start, kind == Kind.PTP)
     moves = GcodeMotions.of(rows, move, kind, plane, start, end, where, desired_path, pose)
     return with_holes(moves, holes, where)
 

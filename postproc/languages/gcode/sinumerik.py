@@ -29,7 +29,7 @@ from postproc.languages.gcode.words import key
 COMMENT = rb'("[^"\r\n]*"?)|;[^\r\n]*'
 
 BEGIN = 65536
-"""Bytes from the start of a file that are looked at to tell whose it is."""
+"""Bytes from the start of a file that are searched for the control that it is for."""
 
 FIRST_NAME = 1000
 """Codes of names are numbers from here on."""

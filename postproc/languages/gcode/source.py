@@ -1,6 +1,6 @@
 """A whole program taken apart: all words of an address in one column, which a range of blocks takes its part of.
 
-Where a word stands is not kept: who writes lexes the lines again that are changed.
+The place of a word is not kept: who writes lexes the lines again that are changed.
 """
 
 from __future__ import annotations

@@ -2,10 +2,10 @@
 
 Rotary axes A, B, C turn the tool against the part: R(A, B, C) = Rz(C) Ry(B) Rx(A) in the base's axes, and the tool
 is at R turned, with ``turned`` its orientation at A = B = C = 0; an axis that no block names stays at 0. That
-holds where X, Y, Z are the tool's tip (TCP modes); else where the tip is, and how the part stands, is the machine's
-own, and only blocks with all rotary axes at 0 say where the tool is. Controls of robots take A, B, C as angles of the
-tool's frame itself (``Control.whole``). A vector, or angles A2= B2= C2=, say where the tool points in the programmed
-coordinates; they hold until another block states an orientation.
+holds where X, Y, Z are the tool's tip (TCP modes); else the place of the tip and the orientation of the part are the
+machine's own, and only blocks with all rotary axes at 0 say where the tool is. Controls of robots take A, B, C as
+angles of the tool's frame itself (``Control.whole``). A vector, or angles A2= B2= C2=, say where the tool points in
+the programmed coordinates; they hold until another block states an orientation.
 
 Between two blocks rotary axes run linearly, as they do under G43.4, under ORIAXES and in the kinematics of LinuxCNC;
 what says a direction runs on a great circle (ORIVECT, ORIPLANE); angles of the tool's frame turn evenly about one axis.
@@ -40,8 +40,8 @@ _SEQUENCES = {EULER: ((2, 0), (0, 1), (2, 2)), RPY: ((2, 2), (1, 1), (0, 0))}
 class ToolOrientation:
     """rotation (N, 3, 3); oriented (N,): the words can be written; free_axis (N, 3): redundant axis; wrong (N,):
     0, or 1 rotary axes away from 0 or not known without a TCP mode, 2 not known in one.  orient (N,) row in
-    ``Stands.orientations``, -1 where none is in force; values, before (N, 3): as in Places.  stated (N,): the block
-    itself states the whole orientation in force.  path (N,) OrientationPath."""
+    ``ToolOrientations.orientations``, -1 where none is in force; values, before (N, 3): as in Places.  stated (N,):
+    the block itself states the whole orientation in force.  path (N,) OrientationPath."""
 
     rotation: Floats
     oriented: Bools
@@ -179,8 +179,8 @@ class ToolOrientations:
         for number in np.unique(stated).tolist():
             other = np.flatnonzero((stated == number) & (now != number))
             if len(other):
-                told = _orientation(given, kind, trace.frames[number].turn, self._turned, self._used)
-                values[other] = orientation.values(told.rotation(values[other]), values[other])
+                turned = _orientation(given, kind, trace.frames[number].turn, self._turned, self._used)
+                values[other] = orientation.values(turned.rotation(values[other]), values[other])
         return np.asarray(values)
 
 

@@ -19,7 +19,7 @@ class Wanted:
     wanted: where the motion is to end; source: where it ends in the source, NaN for what is inserted; own: the number
     that is in its block, NaN where there is none; relative, decimals: see ``Stated``.  fixed (M,): its block must
     stay as it is.  closed (M, K): it has to end exactly where it starts, with as many decimals as that takes.
-    What is not known (NaN wanted) is left as it stands.  origin (M, K): where the motion starts in the source; a fixed
+    What is not known (NaN wanted) keeps its text.  origin (M, K): where the motion starts in the source; a fixed
     one that ends there inherits where the motion before came to.  resumes (M, K): it starts there whatever the motion
     before does: what is between states it, or leaves it unknown (NaN).
     """

@@ -143,7 +143,7 @@ _kept_token = lru_cache(maxsize=4096)(_token)
 
 class _Parser:
     """Recursive descent; evaluates as it goes.  ``place``: after what was read; ``token``: what is there, of the
-    ``kind`` that its first letter tells."""
+    ``kind`` by its first letter."""
 
     def __init__(self, text: bytes, lookup: Lookup) -> None:
         self.text, self.lookup = text, lookup

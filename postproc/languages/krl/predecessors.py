@@ -108,7 +108,7 @@ def _distinct(sources: Iterable[Source], resolved: dict[bytes, set[int]]) -> set
 
 
 def _resolved(rows: MotionRows) -> dict[bytes, set[int]]:
-    """Mark -> the rows that it stands for, of more than two some two."""
+    """Mark -> the rows that it represents, of more than two some two."""
     users: dict[bytes, list[bytes]] = defaultdict(list)
     resolved: dict[bytes, set[int]] = {}
     todo: list[tuple[bytes, int]] = []

@@ -1,4 +1,4 @@
-"""Where the numbers of the motions are in the text: what the reader hands to the writer."""
+"""Where the numbers of the motions are in the text: from the reader to the writer."""
 
 from __future__ import annotations
 

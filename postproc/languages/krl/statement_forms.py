@@ -74,7 +74,7 @@ _SWITCHED = re.compile(rb"INTERRUPT[ \t]++(?:ON|OFF|ENABLE|DISABLE)\b(.*)\Z", re
 
 
 def is_well_formed(statement: Statement) -> bool:
-    """Whether every word of a statement that is no motion has a meaning where it stands."""
+    """Whether every word of a statement that is no motion has a meaning at its place."""
     kind, code, said = statement.kind, statement.code, statement.strings
     if kind in ("motion", "strange", "foreign", "comment", "label", "def") or len(code) > LONGEST:
         return True

@@ -40,7 +40,7 @@ class MotionFact:
     """A motion: ``target``, ``via``: its points (``via`` of an arc alone); speed, zone: [mm/s], [mm], NaN where not
     known; ``stops``: it ends in a stop point.  ``before``: motions after which it runs; ``checked``: the configuration
     of its target counts, None where that is not known.  ``lines``: the run of which it is the first motion, and for
-    which it stands but for the numbers of the targets."""
+    which it represents but for the numbers of the targets."""
 
     statement: Instruction
     form: MotionForm
@@ -63,7 +63,7 @@ class MotionFact:
 
     @property
     def count(self) -> int:
-        """How many motions it stands for."""
+        """How many motions it represents."""
         return 1 if self.lines is None else len(self.lines)
 
     def joined(self, other: MotionFact) -> MotionFact:

@@ -47,7 +47,7 @@ def box_blank(low: Floats, high: Floats) -> Blank:
 
 
 def cylinder_blank(centre: Floats, diameter: float, height: float, lengthwise: int = 2) -> Blank:
-    """A cylinder [m] that stands with the middle of its foot on ``centre`` (3,), along axis 0, 1 or 2."""
+    """A cylinder [m] with the middle of its foot on ``centre`` (3,), along axis 0, 1 or 2."""
     low, high = np.array(centre) - 0.5 * diameter, np.array(centre) + 0.5 * diameter
     low[lengthwise] = centre[lengthwise]
     high[lengthwise] = centre[lengthwise] + height

@@ -184,7 +184,7 @@ CODES = define(
         ),
         "STK023": Code(
             "warning",
-            "spindle stands in a cut",
+            "spindle is stopped in a cut",
             meaning="The program cuts after M5.",
             consequence="A tool that does not turn breaks; the forces are those of one that does, where known.",
             action="Check M3 and M5.",

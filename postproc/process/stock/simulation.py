@@ -306,18 +306,18 @@ def _speeds(
     for index, cutter in enumerate(sweeps.cutters):
         rows = np.unique(sweeps.motion[sweeps.which == index])
         rows = rows[cuts[rows]]
-        back, stands = rows[toolpath.spindle[rows] < 0], rows[toolpath.spindle[rows] == 0]
+        back, stopped = rows[toolpath.spindle[rows] < 0], rows[toolpath.spindle[rows] == 0]
         if len(back):
             message = (
                 f"the program turns the spindle counter-clockwise in {len(back)} motions that cut: tool"
                 f" {cutter.number} is taken for one that cuts so"
             )
             findings.append(Finding("STK022", message, program, int(toolpath.line[back[0]])))
-        if len(stands):
+        if len(stopped):
             message = (
-                f"tool {cutter.number} cuts in {len(stands)} motions after the program stops the spindle"
+                f"tool {cutter.number} cuts in {len(stopped)} motions after the program stops the spindle"
             )
-            findings.append(Finding("STK023", message, program, int(toolpath.line[stands[0]])))
+            findings.append(Finding("STK023", message, program, int(toolpath.line[stopped[0]])))
         rows = rows[_turns(toolpath.spindle[rows])]
         stated = process.edges[cutter.number].speed
         if stated is not None:

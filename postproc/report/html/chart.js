@@ -8,7 +8,7 @@ class Chart {
   // of its own.
   constructor(canvas, series, { unit, log, zero, limit }) {
     Object.assign(this, { canvas, series, unit, log, zero, limit });
-    this.sheet = new Sheet(canvas, (pen, wide, high) => this.paint(pen, wide, high));
+    this.canvas2d = new Canvas(canvas, (pen, wide, high) => this.paint(pen, wide, high));
     this.listen();
     this.chosen();
   }
@@ -237,10 +237,10 @@ class Chart {
     canvas.addEventListener('pointerdown', (event) => {
       canvas.focus({ preventScroll: true });
       canvas.setPointerCapture(event.pointerId);
-      from = [this.sheet.at(event)[0], [...stretch.seen], false];
+      from = [this.canvas2d.at(event)[0], [...stretch.seen], false];
     });
     canvas.addEventListener('pointermove', (event) => {
-      const [x] = this.sheet.at(event);
+      const [x] = this.canvas2d.at(event);
       if (!from) return;
       if (Math.abs(x - from[0]) > 4) from[2] = true;
       if (!from[2]) return;
@@ -249,7 +249,7 @@ class Chart {
     });
     canvas.addEventListener('pointerup', (event) => {
       if (from && !from[2]) {
-        const at = this.rowAt(this.sheet.at(event)[0]);
+        const at = this.rowAt(this.canvas2d.at(event)[0]);
         if (at >= 0) choose(at, true);
       }
       from = null;
@@ -258,7 +258,7 @@ class Chart {
     canvas.addEventListener('wheel', (event) => {
       if (document.activeElement !== canvas && !event.ctrlKey) return;
       event.preventDefault();
-      const at = this.rowAt(this.sheet.at(event)[0]);
+      const at = this.rowAt(this.canvas2d.at(event)[0]);
       zoomStretch(Math.exp(event.deltaY / 400), at >= 0 ? motions.path_length[at] : motions.path_length[chosen]);
     }, { passive: false });
     canvas.addEventListener('keydown', (event) => {
@@ -284,7 +284,7 @@ class Chart {
     canvas.setAttribute('aria-valuetext', words(chosen).join(', '));
     const way = motions.path_length[chosen];
     if (show && (way < from || way > to)) seen(way - 0.5 * (to - from), way + 0.5 * (to - from));
-    this.sheet.later();
+    this.canvas2d.later();
   }
 }
 
@@ -310,7 +310,7 @@ function seen(from, to) {
   const [low, high] = stretch.all, long = Math.min(high - low, Math.max(to - from, 1e-4 * (high - low)));
   const begin = Math.min(Math.max(from, low), high - long);
   stretch.seen = [begin, begin + long];
-  for (const figure of figures) if (figure instanceof Chart) figure.sheet.later();
+  for (const figure of figures) if (figure instanceof Chart) figure.canvas2d.later();
 }
 
 function zoomStretch(by, about) {

@@ -56,7 +56,7 @@ class PartView {
     this.shown = { robot: true, force: true, path: data.scene.path.all <= 20000 };
     this.gl = canvas.getContext('webgl2', { antialias: true, preserveDrawingBuffer: true, alpha: true });
     if (!this.gl) return;
-    this.sheet = { at: (event) => { const box = canvas.getBoundingClientRect(); return [event.clientX - box.left, event.clientY - box.top]; } };
+    this.canvas2d = { at: (event) => { const box = canvas.getBoundingClientRect(); return [event.clientX - box.left, event.clientY - box.top]; } };
     this.values = numbersOf(this.scene.joint_values, Float32Array);
     this.directions = numbersOf(this.scene.axes, Int16Array);
     this.cutters = numbersOf(this.scene.cutter);
@@ -216,7 +216,7 @@ class PartView {
     return [[c, s, 0], [-s * sp, c * sp, cp], [s * cp, -c * cp, sp]];
   }
 
-  // `moved`: what stands beside the part changes too.
+  // `moved`: what is beside the part changes too.
   later(moved = true) {
     this.stale ||= moved;
     if (this.waiting || !this.gl) return;
@@ -296,7 +296,7 @@ class PartView {
     gl.drawArrays(gl.LINE_STRIP, 0, Math.floor((this.points - 1) / every) + 1);
   }
 
-  // What the pointer and the keys do: see `hands`.
+  // What the pointer and the keys do: see `listenToInput`.
   turn(dx, dy) {
     this.yaw -= dx;
     this.pitch = Math.min(Math.PI / 2, Math.max(-Math.PI / 2, this.pitch + dy));

@@ -79,7 +79,7 @@ function showPart() {
   const canvas = byId('part'), view = new PartView(canvas, JSON.parse(place.textContent));
   if (!view.gl) { live.hidden = true; return; }
   byId('part-static').hidden = true;
-  hands(view);
+  listenToInput(view);
   const play = new Playback(view), said = byId('part-line');
   const words = () => {
     const [line, text, rest] = lineOf(view), code = document.createElement('code');

@@ -9,9 +9,9 @@ function start() {
   stretch.seen = [...stretch.all];
   if (given.places.length) chosen = nearest(motions.row, given.places[0]);
 
-  const space = new Space(byId('space'), byId('marks'), byId('tip'));
-  hands(space);
-  figures.push(space);
+  const view = new View3D(byId('view3d'), byId('marks'), byId('tip'));
+  listenToInput(view);
+  figures.push(view);
   const errors = [{ name: 'before', values: motions.before, band: motions.before_width, colour: (t) => t.before, dash: [7, 4], width: 1.7 }];
   if (given.corrected) {
     errors.push({ name: 'after', values: motions.after, band: motions.after_width, colour: (t) => t.after, dash: [], width: 1.7 });
@@ -31,7 +31,7 @@ function start() {
     figures.push(new Chart(byId('correction'), axes, { unit: 'correction, mm', log: false, zero: false }));
     legend(byId('correction-legend'), axes);
   }
-  bar(space, error);
+  bar(view, error);
   figures.push(readout());
   choose(chosen, false);
   addEventListener('beforeprint', () => print(true));
@@ -40,7 +40,7 @@ function start() {
 
 function print(on) {
   printing = on;
-  for (const figure of figures) if (figure.sheet) figure.sheet.now();
+  for (const figure of figures) if (figure.canvas2d) figure.canvas2d.now();
   for (const figure of figures) if (figure.inked) figure.inked();
 }
 
@@ -70,24 +70,24 @@ function legend(place, series) {
   figures.push({ chosen() {}, inked });
 }
 
-function bar(space, error) {
-  byId('quantity').addEventListener('change', (event) => { space.quantity = event.target.value; space.sheet.later(); });
+function bar(view, error) {
+  byId('quantity').addEventListener('change', (event) => { view.quantity = event.target.value; view.canvas2d.later(); });
   for (const name of ['arrows', 'deflected']) {
-    byId(name).addEventListener('change', (event) => { space[name] = event.target.checked; space.sheet.later(); });
+    byId(name).addEventListener('change', (event) => { view[name] = event.target.checked; view.canvas2d.later(); });
   }
   // from once to ten thousand times; at first the largest deflection is a tenth of the part
-  const slider = byId('magnify'), largest = extent(lengths(motions.deflection), space.inside)[1];
+  const slider = byId('magnify'), largest = extent(lengths(motions.deflection), view.inside)[1];
   const magnify = () => {
     const raw = 10 ** (slider.value / 25), size = 10 ** Math.floor(Math.log10(raw));
-    space.magnify = Math.round(raw / size) * size;
-    byId('magnified').textContent = `${space.magnify} ×`;
-    space.sheet.later();
+    view.magnify = Math.round(raw / size) * size;
+    byId('magnified').textContent = `${view.magnify} ×`;
+    view.canvas2d.later();
   };
-  slider.value = largest > 0 ? 25 * Math.log10(Math.max(1, (0.1 * space.size) / largest)) : 0;
+  slider.value = largest > 0 ? 25 * Math.log10(Math.max(1, (0.1 * view.size) / largest)) : 0;
   slider.addEventListener('input', magnify);
   magnify();
   for (const button of document.querySelectorAll('[data-view]')) {
-    button.addEventListener('click', () => space.look(button.dataset.view));
+    button.addEventListener('click', () => view.look(button.dataset.view));
   }
   for (const button of document.querySelectorAll('[data-zoom]')) {
     const by = { in: 0.6, out: 1 / 0.6 }[button.dataset.zoom];
@@ -96,13 +96,13 @@ function bar(space, error) {
   byId('linear').addEventListener('change', (event) => {
     error.log = !event.target.checked;
     error.unit = error.log ? 'error, mm (logarithmic)' : 'error, mm';
-    error.sheet.later();
+    error.canvas2d.later();
   });
   const goTo = (i) => {
     choose(i, true);
-    space.approach();
+    view.approach();
     byId('h-path').scrollIntoView({ block: 'start' });
-    byId('space').focus({ preventScroll: true });
+    byId('view3d').focus({ preventScroll: true });
   };
   for (const button of document.querySelectorAll('[data-row]')) {
     button.addEventListener('click', () => goTo(nearest(motions.row, +button.dataset.row)));

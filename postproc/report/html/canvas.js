@@ -135,7 +135,7 @@ function halo(pen, text, x, y, ink) {
 }
 
 // A canvas as sharp as the screen, drawn once a frame at most.
-class Sheet {
+class Canvas {
   constructor(canvas, draw, clear = false) {
     this.canvas = canvas;
     this.clear = clear;

@@ -6,11 +6,11 @@ const VIEWS = { oblique: [0.6, 0.6], top: [0, Math.PI / 2], front: [Math.PI / 2,
 
 const BINS = 24, SLABS = 24, NEAR = 16, WHILE_MOVING = 15000, ARROWS = 90, CLOSE = 4;
 
-class Space {
+class View3D {
   // marks: a clear canvas above the other, for what changes while the view stays.
   constructor(canvas, marks, tip) {
-    this.sheet = new Sheet(canvas, (pen, wide, high) => this.paint(pen, wide, high));
-    this.above = new Sheet(marks, (pen) => this.marks(pen), true);
+    this.canvas2d = new Canvas(canvas, (pen, wide, high) => this.paint(pen, wide, high));
+    this.above = new Canvas(marks, (pen) => this.marks(pen), true);
     this.canvas = canvas;
     this.tip = tip;
     this.quantity = 'before';
@@ -66,7 +66,7 @@ class Space {
   fit() {
     this.zoom = 1;
     this.shift = [0, 0];
-    this.sheet.later();
+    this.canvas2d.later();
   }
 
   // Unit vectors to the right, up, and towards the reader.
@@ -355,13 +355,13 @@ class Space {
     this.yaw -= dx;
     this.pitch = Math.min(Math.PI / 2, Math.max(-Math.PI / 2, this.pitch + dy));
     this.moving = true;
-    this.sheet.later();
+    this.canvas2d.later();
   }
 
   move(dx, dy) {
     this.shift = [this.shift[0] + dx, this.shift[1] + dy];
     this.moving = true;
-    this.sheet.later();
+    this.canvas2d.later();
   }
 
   zoomAt(by, x, y) {
@@ -370,12 +370,12 @@ class Space {
     this.shift = [x - wide - ratio * (x - wide - this.shift[0]), y - high - ratio * (y - high - this.shift[1])];
     this.zoom = next;
     this.moving = true;
-    this.sheet.later();
+    this.canvas2d.later();
   }
 
   rest() {
     this.moving = false;
-    this.sheet.later();
+    this.canvas2d.later();
   }
 
   restSoon() {
