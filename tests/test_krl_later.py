@@ -117,3 +117,18 @@ def test_nothing_is_inserted_behind_what_may_have_moved_the_robot(
     assert why in told[1]
     assert sorted(told) == [1, 1 + motions]
     assert list(path.constraints.spline_headers) == [1 + motions]
+
+
+@pytest.mark.parametrize("inner", ["", "inner()\n"])
+@pytest.mark.parametrize("when", ["interrupt", "trigger"])
+def test_what_a_routine_that_is_not_followed_starts_goes_on(when: str, inner: str) -> None:
+    """It knows the variable that it gets by its own name too, so that its parameters are not followed."""
+    later = WHEN[when].format("$BASE=BASE_DATA[3]")
+    body = f"DEF sub(w:OUT)\nREAL w\nQ.X=w\n{inner or later}LIN {FULL}\nEND\n"
+    other = f"DEF inner()\n{later}LIN {FULL}\nEND\n" if inner else ""
+    data = Document(Path("part.dat"), b"DEFDAT part\nDECL REAL w2=1\nDECL FRAME Q={X 1}\nENDDAT\n")
+    text = f"DEF part()\nBAS(#BASE,1)\nBAS(#TOOL,1)\nLIN {FULL}\nsub(Q.X)\nLIN {FULL}\nEND\n{body}{other}"
+    program = KrlDialect().read((Document(Path("part.src"), text.encode()), data))
+    after = program.toolpath.line.tolist().index(6)
+    refused = program.toolpath.constraints.refused
+    assert after in refused and "may change base or tool at any time" in refused[after].message

@@ -28,7 +28,7 @@ _codes: set[Any] = set()
 """The code of the functions that numpy calls."""
 
 
-class Place(Protocol):
+class ArrayPlace(Protocol):
     """Where large arrays lie."""
 
     least: int
@@ -69,7 +69,7 @@ def set_handler(handler: Any) -> Any:
     return _set_handler()(None if handler is None else id(handler))
 
 
-def handler_for(place: Place) -> Any:
+def handler_for(place: ArrayPlace) -> Any:
     """A handler that puts large arrays into ``place``, and all others where numpy puts them."""
     before = set_handler(None)
     usual = _Handler.from_address(_address_in(set_handler(before), _NAME)).allocator

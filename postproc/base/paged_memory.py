@@ -134,7 +134,7 @@ class _Storage:
         self.moved: list[tuple[bytes, int, int]] = []
 
     def new(self, size: int, zeros: bool) -> int:
-        """See ``Place``."""
+        """See ``ArrayPlace``."""
         length = -(-size // _STEP) * _STEP
         self.since += length
         if self.since > LOOK:
@@ -159,11 +159,11 @@ class _Storage:
         return address
 
     def size_at(self, address: int) -> int:
-        """See ``Place``."""
+        """See ``ArrayPlace``."""
         return len(self.files[address][0]) if address in self.files else 0
 
     def give_back(self, address: int) -> bool:
-        """See ``Place``."""
+        """See ``ArrayPlace``."""
         file = self.files.pop(address, None)
         if file is None:
             return False

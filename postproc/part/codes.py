@@ -20,7 +20,7 @@ CODES = define(
             meaning="Parts of the surface are beyond the tolerance although their motions are corrected.",
             consequence="A correction is even along a motion; at entries, exits and corners the force is not.",
             action="Look at the worst place on the page; divide its motion where the tool enters, leaves or turns.",
-            example="A pass that is corrected by 0.4 mm, and leaves the blank, and with it the force, half way.",
+            example="A pass that is corrected by 0.4 mm, and leaves the blank, and with it the force, before its end.",
         ),
     }
 )

@@ -308,7 +308,7 @@ FORCE_CODES = define(
             "error",
             "spindle turns counter-clockwise",
             meaning="An operation of the process file cuts after M4.",
-            consequence="Its forces are those of a spindle that turns clockwise: sideways they point the other way.",
+            consequence="Its forces are those of a spindle that turns clockwise: sideways they are opposite.",
             action="Check M3 and M4; state the force, or blank and tools, for which both directions are computed.",
             example="`S12000 M4` before a cut with `direction: down`.",
         ),

@@ -47,10 +47,12 @@ def _not_read(called: str) -> str:
 class Calls(BlockFlow):
     """Follows jumps and calls.
 
-    mentioned_from: start of a routine -> the names in its text; resumes: an interrupt may end a subprogram.
+    mentioned_from: start of a routine -> the names in its text; events_of: routine -> it, or what it calls, states an
+    interrupt or a trigger; resumes: an interrupt may end a subprogram.
     """
 
     mentioned_from: dict[int, frozenset[bytes]]
+    events_of: dict[bytes, bool]
     resumes: bool
 
     def _label(self, pc: int, item: Statement, name: bytes) -> None:
@@ -323,6 +325,8 @@ class Calls(BlockFlow):
             if "point" in routine.effects:
                 run.state.sources = run.rows.joined(run.state.sources | {ELSEWHERE})
             run.forget(routine.effects | words, why)
+            if self._starts_events(name):
+                run.expect_later(run.survey.later_effects, item.line)
             return
         if is_harmless(name):
             return
@@ -338,6 +342,18 @@ class Calls(BlockFlow):
             )
         else:
             run.add_finding("KRL010", _not_read(called), item)
+
+    def _starts_events(self, name: bytes) -> bool:
+        """Whether a routine, or what it calls, states an interrupt or a trigger: it may happen after the return."""
+        if name not in self.events_of:
+            run = self.run
+            routines = (run.survey.routines[inner] for inner in closure(run.survey, [name]))
+            items = (item for one in routines for item in run.code[one.start : one.end + 1])
+            self.events_of[name] = any(
+                isinstance(item, Statement) and item.word in (b"INTERRUPT", b"TRIGGER", b"GLOBAL")
+                for item in items
+            )
+        return self.events_of[name]
 
     def _call_other(self, item: Statement, said: Call) -> None:
         """A routine of another module: what it leaves is worked out, variables are forgotten."""

@@ -143,7 +143,7 @@ def operand_at(run: ExecutionContext, code: bytes, at: int, place: tuple[int, in
     return _variable(run, named, begin, end)
 
 
-class _Named(NamedTuple):
+class _OperandName(NamedTuple):
     """A variable that is named as a target: its name and components (upper case), what is in its brackets, its words in
     a message, and what follows."""
 
@@ -155,15 +155,15 @@ class _Named(NamedTuple):
 
 
 @kept
-def _take_name(text: bytes) -> _Named | None:
+def _take_name(text: bytes) -> _OperandName | None:
     found = _NAMED.match(text)
     if found is None:
         return None
     path = found[3].replace(b" ", b"").replace(b"\t", b"").upper()
-    return _Named(found[1].upper(), found[2], path, shown(found[0]), text[found.end() :])
+    return _OperandName(found[1].upper(), found[2], path, shown(found[0]), text[found.end() :])
 
 
-def _variable(run: ExecutionContext, named: _Named, start: int, end: int) -> Operand:
+def _variable(run: ExecutionContext, named: _OperandName, start: int, end: int) -> Operand:
     name, element, path, words, _ = named
     if element is not None:
         run.mentioned |= identifiers(element)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from postproc.base.document import Document
 from postproc.languages.krl.data import (
@@ -27,9 +27,6 @@ from postproc.languages.krl.target import UnknownValue
 from postproc.languages.krl.variables import Variables
 from postproc.languages.krl.vectorised import Item
 from postproc.toolpath.initial_state import Symbol
-
-if TYPE_CHECKING:
-    from postproc.languages.krl.execution_context import Flow
 
 _APART = re.compile(rb"\$(?:EX_AX_IGNORE|ASYNC_AXIS)[ \t]*+=|\bASY(?:PTP|CONT)\b", re.I)
 MOST_DEPTH = 5
@@ -223,11 +220,9 @@ def state_at_entry(state: ModalState, frames: FrameRegister, inner: FrameRegiste
     return entry
 
 
-def exit_of(flow: Flow | None, frames: FrameRegister, rows: MotionRows) -> RoutineExit | None:
-    """What holds where a routine returns; rows: its motions."""
-    if flow is None:
-        return None
-    state, sources = flow.state, expanded(rows, flow.state.sources)
+def exit_of(state: ModalState, frames: FrameRegister, rows: MotionRows) -> RoutineExit:
+    """What holds where a routine returns, from the ``state`` there; rows: its motions."""
+    sources = expanded(rows, state.sources)
     moves = None if START in sources else True
     if sources == {START} and state.point_unknown == ModalState.point_unknown:
         moves = False

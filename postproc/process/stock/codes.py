@@ -178,8 +178,8 @@ CODES = define(
             "warning",
             "spindle turns counter-clockwise",
             meaning="The program cuts after M4.",
-            consequence="The forces are those of a left-hand cutting tool: another one would not cut.",
-            action="Check M3 and M4, and the helix: that of a left-hand tool that pulls is negative.",
+            consequence="The forces are those of a tool that cuts counter-clockwise: another one would not cut.",
+            action="Check M3 and M4, and the helix: one that pulls under M4 is negative.",
             example="`S12000 M4` before a cut.",
         ),
         "STK023": Code(
