@@ -31,7 +31,7 @@ def test_compiled_once(sources, monkeypatch):
     folder = sources / "__pycache__"
     assert shown(sources, folder) == "3"
     assert len(list(folder.iterdir())) == 1
-    monkeypatch.setattr(jinja2.Environment, "_generate", None)  # nothing is compiled again
+    monkeypatch.setattr(jinja2.Environment, "compile", None)  # nothing is compiled again
     assert shown(sources, folder) == "3"
 
 

@@ -451,12 +451,15 @@ ALLOWED = {
     ("report/result.py", "import_module"),
     ("process/stock/compiled.py", "import_module"),
     ("base/memory.py", "ctypes"),
+    ("base/array_memory.py", "ctypes"),
+    ("base/paged_memory.py", "ctypes"),
+    ("cli/main.py", "import_module"),
     ("posts/freecad/compensate_post.py", "subprocess"),
     ("posts/robodk/kuka_compensated.py", "subprocess"),
     ("posts/robodk/kuka_compensated.py", "import_module"),
 }
-"""The one way out, the cluster that the user names; the package's own names, loaded when they are asked for; pandas and
-numba; the C library of this process, which gives memory back; and what runs in a CAM system, and starts the command."""
+"""The one way out, the cluster that the user names; the package's own names and commands, loaded when they are asked for;
+pandas and numba; the C library of this process, which gives memory back, and numpy's handler of memory; and what runs in a CAM system, and starts the command."""
 
 
 def banned(module: str) -> set[str]:

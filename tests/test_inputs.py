@@ -269,18 +269,20 @@ ELSEWHERE = (
     "posts/",
     "cli/posts.py",
     "base/locks.py",
+    "base/paged_memory.py",
     "output/atomic_write.py",
     "base/read_files.py",
     "cli/streams.py",
     "process/stock/compiled.py",
     "base/input_files.py",
+    "report/compiled_templates.py",
     "report/page.py",
     "robot/write_robot_file.py",
     "workflows/kinds.py",
     "workflows/learn_history.py",
 )
 """What is read there is no input: standard streams, sources of the package, records, locks, heads of files that a batch
-looks at, parts of a page, results, files of other systems."""
+looks at, parts of a page, results, files of other systems, what the system says of memory."""
 
 
 @pytest.mark.slow

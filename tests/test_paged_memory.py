@@ -39,7 +39,7 @@ def small(monkeypatch, tmp_path_factory):
     monkeypatch.setattr(paged_memory, "RESIDENT", 0)
     monkeypatch.setattr(paged_memory, "WAITING", 8 << 20)
     folder = tmp_path_factory.mktemp("room")
-    monkeypatch.setattr(paged_memory, "_folder", lambda room, program: str(folder))
+    monkeypatch.setattr(paged_memory, "temporary_folder", lambda room, program: str(folder))
     return folder
 
 
@@ -82,7 +82,7 @@ def test_samples_have_the_same_bytes(name, tmp_path, monkeypatch, request):
 def test_large_arrays_lie_in_files_and_outlive_the_run(small):
     with paged_memory.large_arrays_in_files(Path(__file__)):
         large, zeros = np.arange(100_000), np.zeros(100_000)
-        storage = paged_memory._storage.get()
+        storage = paged_memory.current_storage.get()
         assert get_handler_name(large) == get_handler_name(zeros) == FILES
         assert {large.ctypes.data, zeros.ctypes.data} <= set(storage.files)
         assert np.arange(10).ctypes.data not in storage.files
@@ -110,7 +110,7 @@ def test_bytes_move_into_a_file_and_stay_what_they_are(small):
     copy = bytearray(text)
     with paged_memory.large_arrays_in_files(Path(__file__)):
         assert paged_memory.in_file(text) is text
-        storage = paged_memory._storage.get()
+        storage = paged_memory.current_storage.get()
         if not storage.moved:
             pytest.skip("this C library has no such mapping")
         paged_memory.release_pages()
@@ -134,7 +134,7 @@ def test_a_disk_without_room_leaves_the_array_in_memory(small, monkeypatch):
     monkeypatch.setattr(os, "posix_fallocate", full)
     with paged_memory.large_arrays_in_files(Path(__file__)):
         array = np.arange(100_000)
-        assert not paged_memory._storage.get().files
+        assert not paged_memory.current_storage.get().files
     assert array.sum() == 99_999 * 50_000
 
 
@@ -152,7 +152,7 @@ def test_no_room_anywhere_is_refused_before_anything_is_computed(tmp_path, monke
 @pytest.mark.parametrize("call", ["new", "give_back"])
 def test_a_signal_while_memory_is_asked_for_is_heard(small, monkeypatch, call):
     """An exception out of what numpy calls would be printed and forgotten."""
-    real, done = getattr(paged_memory._Storage, call), []
+    real, done = getattr(paged_memory.PagedStorage, call), []
 
     def interrupted(storage, *arguments):
         if not done:
@@ -160,7 +160,7 @@ def test_a_signal_while_memory_is_asked_for_is_heard(small, monkeypatch, call):
             signal.raise_signal(signal.SIGINT)
         return real(storage, *arguments)
 
-    monkeypatch.setattr(paged_memory._Storage, call, interrupted)
+    monkeypatch.setattr(paged_memory.PagedStorage, call, interrupted)
     before = signal.getsignal(signal.SIGINT)
 
     def run() -> None:
@@ -184,7 +184,7 @@ paged_memory.PROGRAM = 0
 paged_memory._folder = lambda room, program: sys.argv[1]
 with paged_memory.large_arrays_in_files(Path(sys.argv[1])):
     array = np.ones(4_000_000)
-    assert paged_memory._storage.get().files
+    assert paged_memory.current_storage.get().files
     os.kill(os.getpid(), signal.SIGKILL)
 """
 

@@ -68,7 +68,7 @@ _MAP_FIXED = 0x10
 
 _libc = ctypes.CDLL(None) if sys.platform == "linux" else None
 
-_storage: ContextVar[_Storage | None] = ContextVar("_storage", default=None)
+current_storage: ContextVar[PagedStorage | None] = ContextVar("current_storage", default=None)
 
 
 @contextmanager
@@ -79,25 +79,25 @@ def large_arrays_in_files(program: Path) -> Iterator[None]:
     Raises Refusal FIL013 where neither the disk nor the memory has enough room.
     """
     size, folder = _size(program), None
-    if sys.platform == "linux" and _storage.get() is None and size >= PROGRAM:
-        folder = _folder(ROOM * size, program)
+    if sys.platform == "linux" and current_storage.get() is None and size >= PROGRAM:
+        folder = temporary_folder(ROOM * size, program)
     if folder is None:
         yield
         return
-    storage = _Storage(folder)
-    token, before = _storage.set(storage), set_handler(handler_for(storage))
+    storage = PagedStorage(folder)
+    token, before = current_storage.set(storage), set_handler(handler_for(storage))
     try:
         with storage.watched():
             yield
     finally:
         set_handler(before)
-        _storage.reset(token)
+        current_storage.reset(token)
         storage.close()
 
 
 def in_file(text: bytes) -> bytes:
     """The very ``text``; if it is large its pages are those of a temporary file from now on."""
-    storage = _storage.get()
+    storage = current_storage.get()
     if storage is not None and len(text) >= LARGE:
         storage.move(text)
     return text
@@ -105,14 +105,14 @@ def in_file(text: bytes) -> bytes:
 
 def release_pages() -> None:
     """Give the pages of temporary files back to the system if more than ``RESIDENT`` bytes of them are resident."""
-    storage = _storage.get()
+    storage = current_storage.get()
     if storage is not None:
         storage.release()
 
 
 def with_small_arrays(work: Callable[[Any], T], part: Any) -> T:
     """``work(part)`` of a block, whose arrays are allocated as always: that is faster."""
-    if _storage.get() is None:
+    if current_storage.get() is None:
         return work(part)
     before = set_handler(None)
     try:
@@ -121,7 +121,7 @@ def with_small_arrays(work: Callable[[Any], T], part: Any) -> T:
         set_handler(before)
 
 
-class _Storage:
+class PagedStorage:
     """The temporary files of one run: one for each array, which ends with it."""
 
     def __init__(self, folder: str) -> None:
@@ -288,7 +288,7 @@ def _size(path: Path) -> int:
         return 0
 
 
-def _folder(room: int, program: Path) -> str | None:
+def temporary_folder(room: int, program: Path) -> str | None:
     """The first folder for temporary files on a disk with ``room`` bytes; None where there is none, but memory."""
     names = [name for name in (os.environ.get("TMPDIR"), "/var/tmp", tempfile.gettempdir()) if name]
     disks = [name for name in names if os.path.isdir(name) and os.access(name, os.W_OK) and _is_on_disk(name)]

@@ -51,6 +51,8 @@ def diagnostics(
 
     def add_at(at: Ints, code: str, message: str) -> None:
         at = at[live[at]]
+        # subprograms are behind what calls them, wherever they are in the file
+        at = at[np.argsort(blocks.line[at], kind="stable")]
         if len(at):
             many = (
                 f"; {len(at)} blocks, lines {blocks.line[at[0]]} to {blocks.line[at[-1]]}"
