@@ -458,8 +458,9 @@ ALLOWED = {
     ("posts/robodk/kuka_compensated.py", "subprocess"),
     ("posts/robodk/kuka_compensated.py", "import_module"),
 }
-"""The one way out, the cluster that the user names; the package's own names and commands, loaded when they are asked for;
-pandas and numba; the C library of this process, which gives memory back, and numpy's handler of memory; and what runs in a CAM system, and starts the command."""
+"""The one way out, the cluster that the user names; the package's own names and commands, loaded when they are asked
+for; pandas and numba; the C library of this process, which gives memory back, and numpy's handler of memory; and what
+runs in a CAM system, and starts the command."""
 
 
 def banned(module: str) -> set[str]:

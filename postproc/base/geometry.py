@@ -201,7 +201,8 @@ def abc_from_rotation(rotation: ArrayLike, near: ArrayLike | None = None) -> Flo
 def wrapped(angle: ArrayLike) -> Floats:
     """Angles (...) [rad] brought into (-pi, pi]; of ``angle`` (...) [rad]."""
     value = np.asarray(angle, dtype=float)
-    return value - 2 * np.pi * np.ceil((value - np.pi) / (2 * np.pi))
+    # an angle a hair above -pi is rounded to a turn too many
+    return np.minimum(value - 2 * np.pi * np.ceil((value - np.pi) / (2 * np.pi)), np.pi)
 
 
 def rotation_from_vector(vector: ArrayLike) -> Floats:
