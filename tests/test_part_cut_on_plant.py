@@ -57,7 +57,7 @@ def compare(machine, part, side):
 
 @pytest.mark.slow
 def test_the_part_as_posted_is_the_one_that_the_machine_cuts(reported):
-    """Engagement and deflection of 2.4 mm: the wall within 1 %, the floor 1 um, the wave 3 um but at its rims."""
+    """Engagement and deflection of 2.4 mm: the wall within 1 %, the floor 1 um, the wave 4 um but at its rims."""
     program, task, part = reported
     machine = cut(task, program)
     assert machine.largest == pytest.approx(part.figures.as_posted.force, rel=0.01)
@@ -70,7 +70,7 @@ def test_the_part_as_posted_is_the_one_that_the_machine_cuts(reported):
     assert np.percentile(np.abs(error - true), 95) < 1e-3
     error, true = found["wave"]
     assert np.abs(true).max() > 0.3
-    assert np.percentile(np.abs(error - true), [50, 90]) == pytest.approx([0, 0], abs=3e-3)
+    assert np.percentile(np.abs(error - true), [50, 90]) == pytest.approx([0, 0], abs=4e-3)
 
 
 @pytest.mark.slow

@@ -84,9 +84,10 @@ def test_what_the_script_draws_is_what_the_report_says(page):
     assert faces.max() < len(places) == len(errors)
     assert data["extent"] == pytest.approx([120, 80, 30], abs=0.1)
     # the largest gouge and excess are those of the report
+    # up to where all that is larger has one colour
     after = errors[errors[:, 1] > -32768, 1] / 32767 * data["range"]
-    assert after.max() == pytest.approx(part["after"]["excess_max"], abs=1e-5)
-    assert -after.min() == pytest.approx(part["after"]["gouge_max"], abs=1e-5)
+    for found, key in ((after.max(), "excess_max"), (-after.min(), "gouge_max")):
+        assert found == pytest.approx(min(part["after"][key], 0.99 * data["range"]), abs=1e-5)
     # beyond the tolerance before: most of what the program makes, and nothing else
     before = errors[errors[:, 0] > -32768, 0] / 32767 * data["range"]
     assert (np.abs(before) > data["tolerance"]).mean() == pytest.approx(
@@ -242,7 +243,7 @@ def test_the_browser_follows_the_same_chain(window, page):
 
 
 @pytest.mark.slow
-def test_the_picture_of_the_sample_is_what_the_page_shows(window, page, pytestconfig):
+def test_the_picture_of_the_sample_is_what_the_page_shows(window, chromium, page, pytestconfig):
     """Both halves of part.png, in squares of 10 pixels."""
     from PIL import Image
 
@@ -255,7 +256,7 @@ def test_the_picture_of_the_sample_is_what_the_page_shows(window, page, pytestco
     draw_part = importlib.util.module_from_spec(script)
     script.loader.exec_module(draw_part)
     kept = Image.open(folder / "part.png").convert("RGB")
-    for index, shot in enumerate(draw_part.photograph(page[0])):
+    for index, shot in enumerate(draw_part.photograph(page[0], chromium)):
         wide, high = shot.size
         assert kept.size == (2 * wide, high)
         half = kept.crop((index * wide, 0, (index + 1) * wide, high))

@@ -14,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from PIL import Image
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import Browser, sync_playwright
 
 from postproc.cli.main import run
 
@@ -46,26 +46,28 @@ def make_page(folder: Path) -> Path:
     return place / "compensated" / "part.report.html"
 
 
-def photograph(page: Path) -> list[Image.Image]:
+def photograph(page: Path, browser: Browser) -> list[Image.Image]:
     """As posted, and as compensated."""
     shots = []
-    with sync_playwright() as driver:
-        path = next(path for name in ("chromium", "google-chrome") if (path := shutil.which(name)))
-        browser = driver.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
-        window = browser.new_page(viewport=SIZE, color_scheme="light")
-        window.goto(page.as_uri())
-        for side in (0, 1):
-            window.evaluate(CHOOSE, [LINE, side])
-            window.wait_for_timeout(500)
-            shots.append(Image.open(io.BytesIO(window.locator("#part").screenshot())).convert("RGB"))
-        browser.close()
+    window = browser.new_page(viewport=SIZE, color_scheme="light")
+    window.goto(page.as_uri())
+    for side in (0, 1):
+        window.evaluate(CHOOSE, [LINE, side])
+        window.wait_for_timeout(500)
+        shots.append(Image.open(io.BytesIO(window.locator("#part").screenshot())).convert("RGB"))
+    window.close()
     return shots
 
 
 def main() -> None:
     out = Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "part.png"
     with TemporaryDirectory() as folder:
-        shots = photograph(make_page(Path(folder)))
+        page = make_page(Path(folder))
+        with sync_playwright() as driver:
+            path = next(path for name in ("chromium", "google-chrome") if (path := shutil.which(name)))
+            browser = driver.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
+            shots = photograph(page, browser)
+            browser.close()
     wide, high = shots[0].size
     both = Image.new("RGB", (2 * wide, high), "white")
     for index, shot in enumerate(shots):
