@@ -138,3 +138,10 @@ PROGRAMS = list(posted_programs())
 def test_posted_programs_are_written(path: Path, raw: bytes) -> None:
     dialect = next(one for one in DIALECTS if one.claims(path, raw))
     round_trip(dialect, raw, 1)
+
+
+def test_blocks_of_one_finding_are_in_the_order_of_the_file():
+    """A subprogram comes after what is run, and stands before it in the file: the finding covers both lines."""
+    program = read("linuxcnc", "O305 SUB\n@15.87\nO305 ENDSUB\nG1 F373.9\n@ 70.63\nM30\n", head="")
+    found = next(one for one in program.findings if one.code == "GCO001")
+    assert (found.line, found.message.partition("; ")[2]) == (2, "2 blocks, lines 2 to 5")

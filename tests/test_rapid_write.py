@@ -19,7 +19,7 @@ from postproc.languages.permitted import refuse_other
 from postproc.languages.rapid.quaternions import quaternion_from_rotation
 from postproc.robot.axis_track import follow_axes, nominal_flange
 from postproc.robot.description import find_robot, load_robot
-from postproc.toolpath import Plan, Role
+from postproc.toolpath import Plan, Role, Toolpath
 
 RAPID, KRL = DIALECTS["rapid"], DIALECTS["krl"]
 WRITING = WritingSettings(mm=3, deg=3)
@@ -224,6 +224,15 @@ def test_a_number_after_a_string_with_an_exclamation_mark_is_no_comment() -> Non
         refuse_other(said, Edits.joined([Edit(Span(0, at, at + 1), b"2")]), RAPID.letters)
 
 
+def one_target(flange: Poses, configuration: str) -> Toolpath:
+    """A MoveJ to a pose (1) with these numbers as its confdata."""
+    q = quaternion_from_rotation(flange.rotation, np.array([[1.0, 0, 0, 0]]))[0]
+    place = ",".join(f"{value:.9f}" for value in flange.position[0] / MM)
+    turn = ",".join(f"{value:.12f}" for value in q)
+    target = f"[[{place}],[{turn}],[{configuration}],{EXTRA[10:]}]"
+    return read(f"MODULE m\nPROC main()\nMoveJ {target},v9,fine,tool0;\nENDPROC\nENDMODULE\n").toolpath
+
+
 def test_cfx_names_the_branch_that_the_robot_is_in(tmp_path: Path) -> None:
     """A MoveJ goes to the branch of its cfx, whatever the robot starts in; forward kinematics of other joint values
     that reach the target in each of the eight branches say which it is."""
@@ -232,14 +241,7 @@ def test_cfx_names_the_branch_that_the_robot_is_in(tmp_path: Path) -> None:
     flange = nominal_flange(robot, np.radians([[20.0, 10, 15, 30, 40, 50]]))
     seen = {}
     for cfx in range(8):
-        q = quaternion_from_rotation(flange.rotation, np.array([[1.0, 0, 0, 0]]))[0]
-        place = ",".join(f"{value:.9f}" for value in flange.position[0] / MM)
-        turn = ",".join(f"{value:.12f}" for value in q)
-        program = read(
-            f"MODULE m\nPROC main()\nMoveJ [[{place}],[{turn}],[0,0,0,{cfx}],{EXTRA[10:]}],v9,fine,tool0;\n"
-            "ENDPROC\nENDMODULE\n"
-        )
-        path = program.toolpath
+        path = one_target(flange, f"0,0,0,{cfx}")
         flanges = Poses(path.rotation, path.position)
         track = follow_axes(robot, path, flanges, start)
         if not track.reachable[0]:
@@ -282,14 +284,7 @@ def test_quadrants_are_those_of_the_axes(angles, quadrants, matches) -> None:
     """Axis angles as ABB counts them, and the place to which forward kinematics brings the flange."""
     robot = load_robot(find_robot("abb_irb6700", None))
     flange = nominal_flange(robot, np.radians([angles]))
-    q = quaternion_from_rotation(flange.rotation, np.array([[1.0, 0, 0, 0]]))[0]
-    place = ",".join(f"{value:.9f}" for value in flange.position[0] / MM)
-    turn = ",".join(f"{value:.12f}" for value in q)
-    program = read(
-        f"MODULE m\nPROC main()\nMoveJ [[{place}],[{turn}],[{quadrants},0],{EXTRA[10:]}],v9,fine,tool0;\n"
-        "ENDPROC\nENDMODULE\n"
-    )
-    path = program.toolpath
+    path = one_target(flange, f"{quadrants},0")
     track = follow_axes(robot, path, Poses(path.rotation, path.position), np.radians(angles))
     assert np.degrees(track.q[0]) == pytest.approx(angles, abs=1e-6)
     assert track.turn_matches.tolist() == [matches]
