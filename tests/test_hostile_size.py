@@ -52,6 +52,10 @@ PROGRAMS = {
         *HEAD, "S0()", *CUT, *END,
         *(line for k in range(DEEP // 5) for line in (f"DEF S{k}()", f"S{k + 1}()", "END")),
     ],
+    "calls that give back": [
+        *HEAD, "DECL REAL X0", "S0(X0)", *CUT, *END,
+        *(l for k in range(DEEP // 5) for l in (f"DEF S{k}(X{k}:OUT)", f"S{k + 1}(X{k})", "END")),
+    ],
     "a call of itself": [*HEAD, "part()", *CUT, *END],
 }  # fmt: skip
 

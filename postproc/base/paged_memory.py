@@ -289,7 +289,10 @@ def _size(path: Path) -> int:
 
 
 def temporary_folder(room: int, program: Path) -> str | None:
-    """The first folder for temporary files on a disk with ``room`` bytes; None where there is none, but memory."""
+    """The first folder for temporary files on a disk with ``room`` bytes; None where there is none, but memory.
+
+    Raises Refusal (FIL013) where neither a disk nor the memory has as much.
+    """
     names = [name for name in (os.environ.get("TMPDIR"), "/var/tmp", tempfile.gettempdir()) if name]
     disks = [name for name in names if os.path.isdir(name) and os.access(name, os.W_OK) and _is_on_disk(name)]
     most = 0

@@ -15,7 +15,7 @@ from postproc.languages.krl.flow_frames import BlockFrame, LabelHead, Restart
 from postproc.languages.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, split_values
 from postproc.languages.krl.modal_state import ELSEWHERE, TRIGGERED, ModalState
 from postproc.languages.krl.other_modules import RoutineExit, take_exit
-from postproc.languages.krl.program_structure import Routine, closure
+from postproc.languages.krl.program_structure import MOST_EFFECTS, Routine, callers, closure
 from postproc.languages.krl.statement_effects import (
     EVERYTHING,
     PATH_FROM_FILE,
@@ -47,12 +47,12 @@ def _not_read(called: str) -> str:
 class Calls(BlockFlow):
     """Follows jumps and calls.
 
-    mentioned_from: start of a routine -> the names in its text; events_of: routine -> it, or what it calls, states an
-    interrupt or a trigger; resumes: an interrupt may end a subprogram.
+    mentioned_from: start of a routine -> the names in its text; event_routines: those that state an interrupt or a
+    trigger, themselves or in what they call, once it was asked for; resumes: an interrupt may end a subprogram.
     """
 
     mentioned_from: dict[int, frozenset[bytes]]
-    events_of: dict[bytes, bool]
+    event_routines: set[bytes] | None
     resumes: bool
 
     def _label(self, pc: int, item: Statement, name: bytes) -> None:
@@ -255,6 +255,8 @@ class Calls(BlockFlow):
             return True
         if len(set(names)) < len(names) or any(name in SYSTEM or name.startswith(b"$") for name in names):
             return False
+        if len(run.survey.routines) > MOST_EFFECTS:
+            return False  # as long to look through as nobody waits for
         for name in closure(run.survey, [routine.name]):
             inner = run.survey.routines[name]
             first, last = run.code[inner.start], run.code[min(inner.end, len(run.code) - 1)]
@@ -345,15 +347,20 @@ class Calls(BlockFlow):
 
     def _starts_events(self, name: bytes) -> bool:
         """Whether a routine, or what it calls, states an interrupt or a trigger: it may happen after the return."""
-        if name not in self.events_of:
+        if self.event_routines is None:
             run = self.run
-            routines = (run.survey.routines[inner] for inner in closure(run.survey, [name]))
-            items = (item for one in routines for item in run.code[one.start : one.end + 1])
-            self.events_of[name] = any(
-                isinstance(item, Statement) and item.word in (b"INTERRUPT", b"TRIGGER", b"GLOBAL")
-                for item in items
+            self.event_routines = callers(
+                run.survey,
+                (
+                    one.name
+                    for one in run.survey.routines.values()
+                    if any(
+                        isinstance(item, Statement) and item.word in (b"INTERRUPT", b"TRIGGER", b"GLOBAL")
+                        for item in run.code[one.start : one.end + 1]
+                    )
+                ),
             )
-        return self.events_of[name]
+        return name in self.event_routines
 
     def _call_other(self, item: Statement, said: Call) -> None:
         """A routine of another module: what it leaves is worked out, variables are forgotten."""

@@ -42,7 +42,8 @@ class Flow(NamedTuple):
 class ExecutionContext:
     """What all parts of the interpreter share.
 
-    ``mentioned``: names that code reads, other than as the target of a motion.  ``routine``: the one that runs.
+    ``mentioned``: names that code reads, other than as the target of a motion; ``forgot_all``: something may have
+    changed all that the program assigns.  ``routine``: the one that runs.
     ``walked``: nothing is known of who calls it; ``walked_rows``: first row, and that after the last, of such routines.
     ``followed``: routines that ran.  ``idle``: what no flow leads to is listed.  ``opaque``: the block, if any, whose
     structure is not understood.  ``spline``: the spline block that is open.  ``has_tcp_mode``, ``has_turning``: some
@@ -70,6 +71,7 @@ class ExecutionContext:
     opaque: Block | None = None
     findings: list[Finding] = field(default_factory=list)
     mentioned: set[bytes] = field(default_factory=set)
+    forgot_all: bool = False
     reported: set[tuple[str, str]] = field(default_factory=set)
     routine: Routine | None = None
     walked: bool = False
@@ -98,6 +100,11 @@ class ExecutionContext:
         self.later_speed |= effects & {"feed", "apo"}
         self.state.later_speed |= self.later_speed
 
+    def named(self) -> set[bytes]:
+        """The names that anything asked for or made unknown: no literal of theirs is changed for one motion alone."""
+        assigned = self.survey.assigned if self.forgot_all else ()
+        return self.mentioned | {name.partition(b".")[0] for name in assigned}
+
     def forget(self, effects: Effects, why: str) -> None:
         """Makes unknown what ``effects`` name.  A variable that is forgotten may still hold any value that it had,
         so none of its literals can be changed for one motion alone."""
@@ -114,7 +121,7 @@ class ExecutionContext:
         unclear = UnknownValue("KRL002", f"its value is not known {why}")
         if "all" in words:
             self.variables.forget_all(unclear)
-            self.mentioned |= {name.partition(b".")[0] for name in self.survey.assigned}
+            self.forgot_all = True
         for effect in effects:
             if isinstance(effect, bytes) and self.variables.forget(effect, unclear):
                 self.mentioned.add(effect)

@@ -52,7 +52,7 @@ class ProgramFlow(Calls):
 
     def all(self) -> None:
         run = self.run
-        self.mentioned_from, self.events_of = {}, {}
+        self.mentioned_from, self.event_routines = {}, None
         self.resumes = any(isinstance(item, Statement) and item.word == b"RESUME" for item in run.code)
         start = run.flow()
         pc: int | None = 0
@@ -78,7 +78,7 @@ class ProgramFlow(Calls):
     def outcome(self, routine: Routine, given: tuple[Value | None, ...]) -> Flow | None:
         """What holds where a routine of another module returns that is called with these values."""
         run = self.run
-        self.mentioned_from, self.events_of, self.resumes = {}, {}, False
+        self.mentioned_from, self.event_routines, self.resumes = {}, None, False
         run.resume(Flow(run.initial, run.variables.facts))
         run.routine = routine
         self.begin()

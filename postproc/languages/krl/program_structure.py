@@ -383,6 +383,22 @@ def closure(found: ProgramStructure, names: Iterable[bytes]) -> set[bytes]:
     return seen
 
 
+def callers(found: ProgramStructure, names: Iterable[bytes]) -> set[bytes]:
+    """The routines of the file among ``names``, and all that call one of them, or call what calls one ..."""
+    callers_of: dict[bytes, list[bytes]] = {}
+    for name, routine in found.routines.items():
+        for call in routine.calls:
+            callers_of.setdefault(call, []).append(name)
+    seen: set[bytes] = set()
+    todo = list(names)
+    while todo:
+        name = todo.pop()
+        if name in found.routines and name not in seen:
+            seen.add(name)
+            todo.extend(callers_of.get(name, ()))
+    return seen
+
+
 def _join(into: Effects, more: Iterable[Effect]) -> None:
     into.update(more)
     if len(into) > MOST_EFFECTS:

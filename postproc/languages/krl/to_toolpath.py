@@ -190,7 +190,7 @@ def _refuse_several_starts(rows: MotionRows, table: MotionTable, single: Bools) 
 
 def _lock(run: ExecutionContext) -> None:
     """Literals of variables that other code reads stay as they are."""
-    rows, read = run.rows, run.mentioned | run.survey.read | run.variables.mixed
+    rows, read = run.rows, run.named() | run.survey.read | run.variables.mixed
     for row, variable in rows.variables.items():
         if variable.name and _root(variable.name) in read:
             rows.locked.setdefault(row, READ_TOO)
