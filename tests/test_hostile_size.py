@@ -54,7 +54,7 @@ PROGRAMS = {
     ],
     "calls that give back": [
         *HEAD, "DECL REAL X0", "S0(X0)", *CUT, *END,
-        *(l for k in range(DEEP // 5) for l in (f"DEF S{k}(X{k}:OUT)", f"S{k + 1}(X{k})", "END")),
+        *(line for k in range(DEEP // 5) for line in (f"DEF S{k}(X{k}:OUT)", f"S{k + 1}(X{k})", "END")),
     ],
     "a call of itself": [*HEAD, "part()", *CUT, *END],
 }  # fmt: skip
