@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -460,6 +461,16 @@ def test_without_force_nothing_is_placed(job, compensate):
     with pytest.raises(Refusal) as refusal:
         place(request(job.folder, force="0,0,0"))
     assert refusal.value.findings[0].code == "PLC005"
+
+
+def test_a_robot_without_compliance_is_not_placed(job):
+    shutil.copy(ROOT / "robots" / "abb_irb6700.yaml", job.folder / "stiff.yaml")
+    with pytest.raises(Refusal) as refusal:
+        place(request(job.folder, robot=str(job.folder / "stiff.yaml")))
+    (finding,) = refusal.value.findings
+    assert finding.code == "PLC005"
+    assert "has no compliance" in finding.message
+    assert finding.file == str(job.folder / "stiff.yaml")
 
 
 RAIL = "  rail: +y\n  kuka: {unit: mm, d1"

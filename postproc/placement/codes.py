@@ -40,10 +40,10 @@ CODES = define(
         ),
         "PLC005": Code(
             "error",
-            "nothing is cut",
-            meaning="No motion of the programs carries a force that moves the tool.",
+            "nothing is deflected",
+            meaning="No motion of the programs carries a force, or the robot file states no compliance.",
             consequence="Every place is as good as any other.",
-            action="State a force: --force, as in the main job.",
+            action="State a force with --force as in the main job, or the robot's compliances in its file.",
             example="A program without FORCE comments, and no --force.",
         ),
         "PLC006": Code(

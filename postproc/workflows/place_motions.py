@@ -295,8 +295,12 @@ def track_of(ready: Prepared, stated: Bools) -> tuple[str, float, float] | None:
 def base_of_cuts(ready: Prepared) -> int:
     """Number of the base in which a program cuts first.  Raises Refusal PLC003, PLC005."""
     task, path = ready.task, ready.task.toolpath
+    if not task.model.is_compliant:
+        message = f"{ready.robot.name} has no compliance: no force deflects it, so every place is as good as any other"
+        help = "state its compliances in the robot file, or identify them from measurements (compensate identify)"
+        raise Refusal(Finding("PLC005", message, str(ready.robot.path), help=help))
     rows = np.flatnonzero(task.carries & placed_rows(task))
-    if not len(rows) or not task.model.is_compliant:
+    if not len(rows):
         message = "no motion carries a force that deflects the tool, so every place is as good as any other"
         raise Refusal(Finding("PLC005", message, task.file))
     frame = path.frames[path.base[rows[0]]]
