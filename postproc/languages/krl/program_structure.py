@@ -389,13 +389,12 @@ def callers(found: ProgramStructure, names: Iterable[bytes]) -> set[bytes]:
     for name, routine in found.routines.items():
         for call in routine.calls:
             callers_of.setdefault(call, []).append(name)
-    seen: set[bytes] = set()
-    todo = list(names)
+    seen = {name for name in names if name in found.routines}
+    todo = list(seen)
     while todo:
-        name = todo.pop()
-        if name in found.routines and name not in seen:
-            seen.add(name)
-            todo.extend(callers_of.get(name, ()))
+        new = set(callers_of.get(todo.pop(), ())) - seen
+        seen |= new
+        todo += new
     return seen
 
 
