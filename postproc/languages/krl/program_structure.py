@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -372,27 +372,25 @@ def program_structure(
 
 def closure(found: ProgramStructure, names: Iterable[bytes]) -> set[bytes]:
     """The routines of the file among ``names``, and all that they call."""
-    seen: set[bytes] = set()
-    todo = list(names)
-    while todo:
-        name = todo.pop()
-        routine = found.routines.get(name)
-        if routine is not None and name not in seen:
-            seen.add(name)
-            todo.extend(routine.calls)
-    return seen
+    return _reached(found.routines, names, lambda name: found.routines[name].calls)
 
 
 def callers(found: ProgramStructure, names: Iterable[bytes]) -> set[bytes]:
     """The routines of the file among ``names``, and all that call one of them, or call what calls one ..."""
-    callers_of: dict[bytes, list[bytes]] = {}
+    callers_of: dict[bytes, set[bytes]] = {}
     for name, routine in found.routines.items():
         for call in routine.calls:
-            callers_of.setdefault(call, []).append(name)
-    seen = {name for name in names if name in found.routines}
+            callers_of.setdefault(call, set()).add(name)
+    return _reached(found.routines, names, lambda name: callers_of.get(name, ()))
+
+
+def _reached(
+    routines: Mapping[bytes, Routine], names: Iterable[bytes], steps: Callable[[bytes], Iterable[bytes]]
+) -> set[bytes]:
+    seen = {name for name in names if name in routines}
     todo = list(seen)
     while todo:
-        new = set(callers_of.get(todo.pop(), ())) - seen
+        new = {name for name in steps(todo.pop()) if name in routines and name not in seen}
         seen |= new
         todo += new
     return seen
