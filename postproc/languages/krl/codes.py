@@ -282,5 +282,16 @@ CODES = define(
             action="Correct the statement, or check that it changes no position, base or tool.",
             example="`WAIT SEC 0.5 0.7`, or `IF $IN[1] THAN`.",
         ),
+        "KRL035": Code(
+            "info",
+            "advance run stops",
+            meaning=(
+                "A statement between two motions stops the advance run, or may: it waits, or it reads or sets inputs, "
+                "outputs or where the robot is, and no CONTINUE is before it."
+            ),
+            consequence="The controller cannot approximate the motion before it; the path is computed with a stop.",
+            action="State CONTINUE before the statement, or use TRIGGER, if the motion is to be approximated.",
+            example="`$OUT[1]=TRUE` between two `LIN ... C_DIS`.",
+        ),
     }
 )

@@ -108,7 +108,8 @@ class ModalState:
     program has set so that motions do not take them along; no_insert: why nothing can be inserted before the next
     motion, "" where it can; root_set: the line, if any, from which on the program itself states where the robot is in
     the world; later_since: the line, if any, from which on an interrupt or a trigger may change base or tool;
-    later_speed: which of "feed" and "apo" one may change.
+    later_speed: which of "feed" and "apo" one may change; stop: whether the advance run stops before the next motion,
+    no_advance: before every one: 2 where it does, 1 where it may.
     """
 
     base: FrameIndex | UnknownValue = NO_BASE
@@ -135,6 +136,8 @@ class ModalState:
     root_set: int = 0
     later_since: int = 0
     later_speed: frozenset[Effect] = frozenset()
+    stop: int = 0
+    no_advance: int = 0
 
     @property
     def steady_feed(self) -> float:
@@ -143,7 +146,9 @@ class ModalState:
 
     @property
     def steady_blend(self) -> float:
-        """[mm] the same of $APO.CDIS."""
+        """[mm] the same of $APO.CDIS; 0 where no motion is planned ahead."""
+        if self.no_advance:
+            return 0.0 if self.no_advance == 2 and "apo" not in self.later_speed else NAN
         return NAN if "apo" in self.later_speed else self.blend
 
     def copy(self) -> ModalState:
@@ -277,5 +282,7 @@ _JOINS: dict[str, Callable[[Any, Any], object]] = {
     "root_set": _either,
     "later_since": _either,
     "later_speed": frozenset.union,
+    "stop": lambda one, other: 1,
+    "no_advance": lambda one, other: 1,
     "point_line": lambda one, other: one,
 }

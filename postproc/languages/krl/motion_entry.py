@@ -102,7 +102,7 @@ def enter_motion(
         stated = stated.detached()
     external = _external(state, target, relative)
     rows = run.rows
-    rows.note_sources(state.sources)
+    rows.note_start(state)
     row = rows.add(
         MotionRow(
             kind, statement.line, extent(statement, operand), values or NAN6, axes or NAN6,

@@ -71,7 +71,8 @@ class MotionRows:
 
     ``passing``: points of spline blocks; ``entries``: first point of such a block -> line of its header.
     ``arc_blends``: exact arcs -> $APO.CDIS [mm] there.  ``sources_of``: rows that may start elsewhere than where the
-    row before ends -> where.  ``left_from``: where routines end after which it is not known what runs.
+    row before ends -> where.  ``stopped``: rows before which the advance run stops (2) or may (1).
+    ``left_from``: where routines end after which it is not known what runs.
     ``never_from``: the first row of those that never run.
     """
 
@@ -87,6 +88,7 @@ class MotionRows:
     relative: dict[int, Relative] = field(default_factory=dict)
     whole: dict[int, str] = field(default_factory=dict)
     sources_of: dict[int, frozenset[Source]] = field(default_factory=dict)
+    stopped: dict[int, int] = field(default_factory=dict)
     left_from: set[Source] = field(default_factory=set)
     never_from: int | None = None
     inline: dict[int, InlineForm] = field(default_factory=dict)
@@ -137,8 +139,13 @@ class MotionRows:
             self.ranges.append((first, self.count, reason))
         return self.count - 1
 
-    def note_sources(self, sources: frozenset[Source]) -> None:
-        """Notes where the next row may start, if that is not where the row before ends."""
+    def note_start(self, state: ModalState) -> None:
+        """Notes where the next row may start, if that is not where the row before ends, and whether the advance run
+        stops before it."""
+        sources = state.sources
+        if state.stop:
+            self.stopped[self.count] = state.stop
+            state.stop = 0
         if len(sources) != 1 or self.count - 1 not in sources:
             self.sources_of[self.count] = sources
 
@@ -170,6 +177,7 @@ class MotionRows:
         for sparse in (
             self.anchors, self.reasons, self.variables, self.locked, self.arcs, self.relative, self.whole, self.inline,
             self.approximated, self.arc_blends, self.builds_on, self.passing, self.entries, self.sources_of,
+            self.stopped,
         ):  # fmt: skip
             while sparse and next(reversed(sparse)) >= count:
                 sparse.popitem()

@@ -55,7 +55,7 @@ def move_bulk(run: ExecutionContext, bulk: VectorisedLines) -> None:
     """Takes up a run of common lines."""
     state = run.state
     reason = structure_refusal(run) or frames_missing(run)
-    run.rows.note_sources(state.sources)
+    run.rows.note_start(state)
     if state.no_insert:
         run.rows.whole[len(run.rows)] = state.no_insert
         state.no_insert = ""
@@ -138,4 +138,6 @@ def _blend(state: ModalState, parts: Parts) -> float:
     """[mm] that the controller may leave the path before the end point."""
     if not parts.approximations:
         return 0.0
-    return state.steady_blend if set(parts.approximations) == {b"C_DIS"} else NAN
+    if state.no_advance or set(parts.approximations) == {b"C_DIS"}:
+        return state.steady_blend
+    return NAN

@@ -43,7 +43,7 @@ _MOTION = Statement("motion", b"", b"", 0, 0)
 
 MODAL_FIELDS = (
     "base", "tool", "feed", "blend", "tool_known", "orientation", "arc_frame", "frames_record", "path_record",
-    "axis_record",
+    "axis_record", "no_advance",
 )  # fmt: skip
 """What a called routine leaves to its caller, besides variables and the position."""
 POSITION_FIELDS = (
@@ -237,6 +237,7 @@ def take_exit(
     entry = state.base, state.tool
     for name in MODAL_FIELDS:
         setattr(state, name, getattr(exit, name))
+    state.stop = exit.stop if left.moves else max(before.stop, exit.stop)
     state.base, state.tool = (_moved(one, inner, frames, line) for one in (exit.base, exit.tool))
     if isinstance(state.base, UnknownValue):
         state.base = (

@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 
 from postproc.languages.krl import motions
+from postproc.languages.krl.advance_run import Stop, advance_of, stop_of
 from postproc.languages.krl.assignments import assign, declare
 from postproc.languages.krl.calls import Calls
 from postproc.languages.krl.execution_context import Flow
@@ -130,7 +131,7 @@ class ProgramFlow(Calls):
         run = self.run
         mark = b"routine %d" % routine.line
         run.rows.sources[mark].add(ELSEWHERE)
-        run.state = ModalState(sources=frozenset([mark]))
+        run.state = ModalState(sources=frozenset([mark]), stop=Stop.MAYBE)
         run.state.root_set, run.state.later_since = run.root_set, run.later_since
         run.state.later_speed = run.later_speed
         run.walked = True
@@ -200,6 +201,8 @@ class ProgramFlow(Calls):
             run.variables.line = item.line
             motions.move(run, item)
             return pc + 1
+        if kind != "motion":
+            self._advance_run(pc, item)
         if not item.code.isascii() and kind != "motion" and has_foreign_letters(item.code):
             self._report_letters(item)
         run.variables.line = item.line
@@ -247,6 +250,22 @@ class ProgramFlow(Calls):
                 run.state.no_insert = TRIGGERED
             self._later(item)
         return pc + 1
+
+    def _advance_run(self, pc: int, item: Statement) -> None:
+        """Takes up whether the advance run stops at a statement."""
+        state = self.run.state
+        ahead = advance_of(item)
+        if ahead is not None:
+            state.no_advance = ahead
+        state.stop = max(state.stop, stop_of(item, self._is_continued(pc), self.run.type_of))
+
+    def _is_continued(self, pc: int) -> bool:
+        """Whether a CONTINUE is before a statement."""
+        for before in range(pc - 1, -1, -1):
+            item = self.run.code[before]
+            if isinstance(item, VectorisedLines) or item.kind != "comment":
+                return isinstance(item, Statement) and item.word == b"CONTINUE"
+        return False
 
     def _block_event(self, pc: int, item: Statement) -> int | None:
         """Opens, changes or closes blocks; gives where it goes on if that is not after the statement."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from postproc.base.arrays import Bools, FewRows, Floats, Ints, is_shared
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
+from postproc.languages.krl.advance_run import stopped_motions
 from postproc.languages.krl.controller_data import with_declared
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.modal_state import ELSEWHERE, Source
@@ -57,6 +58,7 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
     axes = np.array(list(table.axes.values())).reshape(-1, 6) * DEG
     several = _several(table)
     continues = _kept(continuous(rows, single))
+    stopped = _stop(table, stopped_motions(rows, continues))
     toolpath = Toolpath(
         kind=_kept(table.kind),
         position=_kept(table.position),
@@ -93,7 +95,11 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
         external=_kept(table.external),
     )
     found = None if table.spots is None else _places(rows, table, table.spots)
-    return toolpath, found, [*_reported(rows, table, refused), *_told_external(rows, table)]
+    return (
+        toolpath,
+        found,
+        [*_reported(rows, table, refused), *_told_external(rows, table), *_told_stops(rows, table, stopped)],
+    )
 
 
 def _places(rows: MotionRows, table: MotionTable, spots: Spots) -> KrlSourceMap:
@@ -240,6 +246,30 @@ def _oriented(table: MotionTable) -> Bools:
     if not keep.any():
         return np.broadcast_to(True, keep.shape)
     return _kept(~(keep | np.append(keep[1:], False)))
+
+
+def _stop(table: MotionTable, blends: dict[int, float]) -> dict[int, float]:
+    """Takes up where approximations are not possible; gives these, those of motions that state none left out."""
+    stated = {row: blend for row, blend in blends.items() if table.blend[row] != 0.0}
+    for row, blend in stated.items():
+        table.blend[row] = blend
+    return stated
+
+
+def _told_stops(rows: MotionRows, table: MotionTable, stopped: dict[int, float]) -> list[Finding]:
+    """Where the program states approximations at which the controller stops, or may."""
+    findings = []
+    for verb, found in (
+        ("stops", [row for row, blend in stopped.items() if blend == 0.0]),
+        ("may stop", [row for row, blend in stopped.items() if blend != 0.0]),
+    ):
+        if found:
+            more = f"; {len(found)} motions, lines {table.line[found].min()} to {table.line[found].max()}"
+            message = f"the advance run {verb} after it, and so does the robot: it is not approximated"
+            if verb != "stops":
+                message = f"the advance run {verb} after it: whether it is approximated is not known"
+            findings.append(_finder(rows, table)(min(found), "KRL035", message + more * (len(found) > 1)))
+    return findings
 
 
 def _stops(rows: MotionRows, table: MotionTable) -> Bools:

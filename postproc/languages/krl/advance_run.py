@@ -1,0 +1,124 @@
+"""Where the advance run stops: before such a statement the controller comes to rest, whatever approximation is
+written.
+
+Statements that wait, and those that read or set inputs, outputs or where the robot is, stop it (KUKA System Software 8,
+operating and programming instructions for system integrators, "advance run"); CONTINUE before a statement prevents it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import IntEnum
+
+from postproc.base.arrays import Bools
+from postproc.languages.krl.lexing import Assignment, Call, Statement, identifiers, kept
+from postproc.languages.krl.modal_state import NAN
+from postproc.languages.krl.motion_rows import MotionRows
+from postproc.languages.krl.predecessors import expanded
+from postproc.languages.krl.statement_effects import READS_POSITION, SYSTEM, bas
+
+
+class Stop(IntEnum):
+    """Whether the advance run stops."""
+
+    NONE = 0
+    MAYBE = 1
+    SURE = 2
+
+
+_STOPPING = frozenset(b"$IN $OUT $ANIN $ANOUT $DIGIN1 $DIGIN2 $DIGIN3 $DIGIN4 $DIGIN5 $DIGIN6".split())
+_FLOWING = frozenset(
+    b"$VEL $VEL_AXIS $ACC $ACC_AXIS $JERK $GEAR_JERK $LOAD $ADVANCE $NULLFRAME $OUT_C $FLAG $CYCFLAG $BWDSTART $H_POS "
+    b"$SPL_VEL_MODE $SPL_VEL_RESTR BASE_DATA TOOL_DATA LOAD_DATA".split()
+) | {name for name in SYSTEM if name not in (b"$WORLD", b"$ROBROOT")}
+_WORDS = frozenset(
+    b"AND OR NOT EXOR B_AND B_OR B_NOT B_EXOR IF THEN ELSE ENDIF WHILE ENDWHILE REPEAT UNTIL FOR TO STEP ENDFOR LOOP "
+    b"ENDLOOP SWITCH CASE DEFAULT ENDSWITCH RETURN RESUME TRUE FALSE DECL GLOBAL "
+    b"ABS SIN COS TAN ACOS ATAN ATAN2 SQRT FORWARD INVERSE INV_POS "
+    b"X Y Z A B C S T E1 E2 E3 E4 E5 E6 A1 A2 A3 A4 A5 A6".split()
+)
+_SILENT_WORDS = frozenset(
+    b"TRIGGER INTERRUPT GLOBAL CONTINUE EXT EXTFCT EXTP IMPORT SIGNAL ENUM STRUC INI BRAKE".split()
+)
+_EVALUATED = frozenset(["open", "branch", "close", "return", "assignment"])
+_TALKING = frozenset(
+    b"IR_STOPM CWRITE CREAD SREAD SWRITE COPEN CCLOSE MBX_REC MSGNOTIFY MSGQUIT MSGDIALOG MSGLOOP CONFIRM DELMENS "
+    b"IS_KEY_PRESSED GETSYSSTATE GET_SIG_INF TIMER_LIMIT".split()
+)
+
+
+def stop_of(statement: Statement, continued: bool, type_of: Callable[[bytes], bytes]) -> Stop:
+    """Whether the advance run stops at a statement other than a motion; continued: CONTINUE is before it; type_of: the
+    type with which a variable is declared.  What is not declared may be a signal, and stop it."""
+    found = _stop(statement, type_of)
+    if found is Stop.SURE and continued:
+        return Stop.MAYBE if statement.word == b"WAIT" else Stop.NONE
+    return found
+
+
+def _stop(statement: Statement, type_of: Callable[[bytes], bytes]) -> Stop:
+    kind, word, said = statement.kind, statement.word, statement.strings
+    if word in (b"WAIT", b"HALT"):
+        return Stop.SURE
+    if word in _SILENT_WORDS or kind in ("comment", "def", "end", "label", "goto", "exit", "declaration"):
+        return Stop.NONE
+    if word in (b"ANOUT", b"ANIN", b"DIGIN") or kind in ("strange", "foreign"):
+        return Stop.MAYBE
+    if isinstance(said, Call):
+        if said.name == b"PULSE":
+            return Stop.SURE
+        return max(Stop.MAYBE if said.name in _TALKING else Stop.NONE, _read(said.arguments, type_of))
+    if isinstance(said, Assignment) and SYSTEM.get(said.name) == "record":
+        return Stop.NONE  # the records of inline forms are no signals
+    if isinstance(said, Assignment):
+        return max(_name(said.name, type_of), _read(said.element or b"", type_of), _read(said.value, type_of))
+    return _read(statement.code, type_of) if kind in _EVALUATED else Stop.NONE
+
+
+def _read(code: bytes, type_of: Callable[[bytes], bytes]) -> Stop:
+    if not code or code.isdigit():
+        return Stop.NONE
+    return max((_name(name, type_of) for name in _names(code)), default=Stop.NONE)
+
+
+@kept
+def _names(code: bytes) -> frozenset[bytes]:
+    return identifiers(code) - _WORDS
+
+
+def _name(name: bytes, type_of: Callable[[bytes], bytes]) -> Stop:
+    if name in _STOPPING or READS_POSITION.match(name):
+        return Stop.SURE
+    if name in _FLOWING or (not name.startswith(b"$") and type_of(name)):
+        return Stop.NONE
+    return Stop.MAYBE
+
+
+def advance_of(statement: Statement) -> Stop | None:
+    """What a statement makes of $ADVANCE: SURE where no motion is planned ahead of another; None: nothing."""
+    said = statement.strings
+    if isinstance(said, Assignment) and said.name == b"$ADVANCE":
+        digits = said.value.strip()
+        if not digits.isdigit():
+            return Stop.MAYBE
+        return Stop.NONE if int(digits) else Stop.SURE
+    if isinstance(said, Call) and said.name == b"BAS" and (bas(said.arguments) or (b"",))[0] == b"INITMOV":
+        return Stop.NONE
+    return None
+
+
+def stopped_motions(rows: MotionRows, continues: Bools) -> dict[int, float]:
+    """Rows that are not approximated, because the advance run stops after them -> 0; NaN where only maybe it does.
+
+    continues (N,): rows that surely start where the row before ends, at which no other motion starts.
+    """
+    found: dict[int, float] = {}
+    for row, stop in rows.stopped.items():
+        if row and continues[row]:
+            found[row - 1] = 0.0 if stop == Stop.SURE else NAN
+            continue
+        sources = rows.sources_of.get(row)
+        for before in {row - 1} if sources is None else expanded(rows, sources):
+            if before >= 0:
+                found[before] = NAN
+    return found
