@@ -51,6 +51,16 @@ def short_motions() -> Callable[[Path], Path]:
     return contour([(30 - 30 * np.cos(a), 30 * np.sin(a)) for a in angle], "C_DIS", 0.5)
 
 
+def waiting(*between: str) -> Callable[[Path], Path]:
+    """The square, with statements after its corners."""
+    points = [f"LIN {pose(x, y, 0)} C_DIS" for x, y in SQUARE]
+    body = [line for i, point in enumerate(points) for line in (point, *between[i : i + 1])]
+    return krl(
+        f"LIN {pose(0, 0, 50)}", f"LIN {pose(*START)}", CUT, *body, OFF, f"LIN {pose(*SQUARE[-1], 50)}",
+        head=("$APO.CDIS=2",),
+    )  # fmt: skip
+
+
 def blended(word: str) -> Callable[[Path], Path]:
     return gcode(
         "G21 G90 G17 G54", "T1 M6", word, "G0 X0. Y0. Z20.", "G1 Z0. F600", "(FORCE -150 260 -60 @FEED)",
@@ -87,6 +97,7 @@ FURTHER: list[Case] = [
     Case("entered and left, C_DIS 3", contour(SQUARE, "C_DIS", 3, "C_DIS", "C_DIS", above=SLANT)),
     Case("one motion, entered and left", contour([(200, 0)], "", 3, "C_DIS", "C_DIS", above=SLANT)),
     Case("closed, C_DIS 2", contour([(100, 0), (100, 60), (0, 60), (0, 0)], "C_DIS", 2)),
+    Case("corners, stops of the advance run", waiting("WAIT SEC 0", "$OUT[3]=TRUE", "CONTINUE\n$OUT[3]=FALSE")),
     Case("corners, C_VEL", contour(SQUARE, "C_VEL", 0.5)),
     Case("399 short motions", short_motions()),
     Case("force steps between arcs, C_DIS", half_circle("C_DIS")),

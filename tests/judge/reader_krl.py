@@ -17,6 +17,7 @@ _MOTION = re.compile(r"(S?PTP|S?LIN|S?CIRC|SPL)\b\s*(.*)", re.I)
 _DECL = re.compile(
     r"DECL\s+(?:GLOBAL\s+)?(E6POS|POS|FRAME|E6AXIS|FDAT|LDAT|PDAT)\s+(\w+)\s*=\s*\{(.*)\}", re.I
 )
+STOPPING = re.compile(r"(?:WAIT|HALT)\b|\$(?:OUT|ANOUT)\s*\[", re.I)
 _FORCE = re.compile(r";\s*FORCE\s+(OFF|[-+0-9., Ee]+?)\s*(?:@\s*(\w+))?\s*$", re.I)
 FULL = ("X", "Y", "Z", "A", "B", "C")
 
@@ -66,6 +67,7 @@ class _Reader:
         self.active: dict[str, dict | None] = {}
         self.spline = 0
         self.in_spline = False
+        self.continued = False
         self.set_tool(min(cell.tools, default=0))
         self.state.base = cell.robot_base
 
@@ -94,7 +96,10 @@ class _Reader:
         elif code.upper().startswith("ENDSPLINE"):
             self.in_spline = False
         else:
+            if STOPPING.match(code) and not self.continued and self.motions:
+                self.motions[-1].approximation = 0.0  # nothing is planned ahead, so nothing is rounded
             self.statement(code)
+        self.continued = code.upper() == "CONTINUE"
 
     def force(self, numbers: str, frame: str | None) -> None:
         if numbers.upper() == "OFF":
@@ -129,7 +134,7 @@ class _Reader:
             self.active[found[1]] = self.data.get(found[2])
         elif found := re.match(r"BAS\(#(\w+),([-+0-9.E]+)\)", word):
             self.bas(found[1], float(found[2]))
-        elif re.match(r"(DEF|END|INTERRUPT|GLOBALINTERRUPT|HALT|WAIT|\$|EXT|DECL|INT|BAS)", word):
+        elif re.match(r"(DEF|END|INTERRUPT|GLOBALINTERRUPT|HALT|WAIT|CONTINUE|\$|EXT|DECL|INT|BAS)", word):
             return
         else:
             raise Unread("a statement that the judge does not know")
