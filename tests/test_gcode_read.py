@@ -253,6 +253,23 @@ def test_how_far_the_path_may_be_left(text: str, blend: float) -> None:
 
 
 @pytest.mark.parametrize(
+    ("between", "blend"),
+    [
+        ("", 0.05), ("(comment)", 0.05), ("F300", 0.05), ("S900", 0.05), ("G55", 0.05), ("G4 P0.5", 0.0), ("M0", 0.0),
+        ("M1", 0.0), ("G4 P0.5\nM8", 0.0), ("M8", np.nan), ("M8\nF500", np.nan), ("T2", np.nan),
+    ],
+)  # fmt: skip
+def test_the_path_is_not_left_where_the_control_stops(between: str, blend: float) -> None:
+    path = body(f"G64 P0.05\nG1 X1 F200\nG1 Y1\n{between}\nG1 X2\nG1 Y2\n").toolpath
+    np.testing.assert_allclose(path.approximation[-4:] * 1000, [0.05, blend, 0.05, 0.05])
+
+
+def test_a_stop_in_the_block_of_a_motion_is_at_its_end() -> None:
+    path = body("G64 P0.05\nG1 X1 F200\nG1 Y1 M0\nG1 X2\nG1 Y2 M9\nG1 X3\n").toolpath
+    np.testing.assert_allclose(path.approximation[-5:] * 1000, [0.05, 0, np.nan, np.nan, 0.05])
+
+
+@pytest.mark.parametrize(
     ("text", "tool"),
     [
         ("T3 M6\n", 3), ("T3\nM6\nT4\n", 3), ("T3 M6\nT4\nM6\n", 4), ("T5\n", 5), ("", 1), ("T0\n", 1),

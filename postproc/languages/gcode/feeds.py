@@ -80,6 +80,34 @@ class Feeds:
         return np.where(switch == 5.0, 0.0, np.where(back, -size, size))
 
 
+_HALTS = (0.0, 1.0, 60.0)
+"""M that stop the program when their block has ended."""
+_FLOW = (2.0, 17.0, 30.0, 97.0, 98.0, 99.0)
+"""M that say where the program goes on or ends; what is called is followed."""
+
+
+def with_stops(blend: Floats, given: BlockWords, rows: Ints) -> Floats:
+    """``blend`` (N,) [m] of the motions in blocks ``rows`` (N,), as of ``blends``, but 0 where the control stops after
+    a motion whatever its path mode, because a dwell or a halt is behind it, and NaN where it may: controls differ in
+    whether they blend over other M and tools."""
+    codes = given.words(key("M"))
+    called = np.isin(codes.value, _FLOW)
+    halts = np.isin(codes.value, _HALTS)
+    before_dwell = np.searchsorted(rows, np.flatnonzero(given.modal.has(Once.DWELL)), side="left") - 1
+    before_halt = np.searchsorted(rows, codes.block[halts], side="right") - 1
+    stops = np.concatenate([before_dwell, before_halt])
+    unclear = np.concatenate([codes.block[~halts & ~called], given.words(key("T")).block])
+    maybe = np.concatenate([np.searchsorted(rows, unclear, side=side) - 1 for side in ("left", "right")])
+    stops, maybe = stops[stops >= 0], maybe[maybe >= 0]
+    stops, maybe = stops[blend[stops] != 0.0], maybe[blend[maybe] > 0.0]
+    if not len(stops) and not len(maybe):
+        return blend
+    result = np.array(blend)
+    result[maybe] = np.nan
+    result[stops] = 0.0
+    return result
+
+
 def _latest(column: WordColumn, blocks: Ints) -> tuple[Ints, Floats]:
     """The blocks (N,) that state what holds in ``blocks`` (N,), and what; 0 and NaN where none does."""
     at = np.searchsorted(column.block, blocks, side="right") - 1

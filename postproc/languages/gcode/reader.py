@@ -56,7 +56,7 @@ from postproc.languages.gcode.drill_cycles import (
 )
 from postproc.languages.gcode.execution import FoldedWords, execute
 from postproc.languages.gcode.external_axes import external_axes, moves_external, others_move
-from postproc.languages.gcode.feeds import Feeds, blend_tolerances, blends
+from postproc.languages.gcode.feeds import Feeds, blend_tolerances, blends, with_stops
 from postproc.languages.gcode.integer_words import integer_words
 from postproc.languages.gcode.lexing import FARTHEST
 from postproc.languages.gcode.modal import modal
@@ -156,7 +156,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         ),
         annotations=said.annotations,
         arcs=Arcs(*(found.taken(name) for name in ("centre", "normal", "sweep", "plane_free"))),
-        approximation=found.taken("blend"),
+        approximation=with_stops(found.taken("blend"), given, rows),
         comments=said.comments,
         inverse_time_feed=timed if timed.any() else everywhere(False, len(rows)),
         orientation_control=OrientationControl(
