@@ -195,3 +195,24 @@ def test_the_sample_can_be_made_again_and_is_understood() -> None:
     program = read(raw, ReadingSettings(symbols={"TSPINDLE": 1.0}))
     assert len(program.toolpath) == 25
     assert not program.findings
+
+
+LINES = [f"MoveL [[{x},2,3],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z5,t;\n" for x in range(4)]
+
+
+@pytest.mark.parametrize(
+    ("between", "zone"),
+    [
+        ("", 5), ("SetDO out1,1;", 5), ("i:=1;", 5), ("! a remark", 5), ("AccSet 50,50;", 5), ("quick;", 5),
+        ("WaitTime 0.5;", 0), ("WaitTime \\InPos,0;", 0), ("Stop;", 0), ("WaitRob \\InPos;", 0), ("slow;", 0),
+        ("WaitTime 0;", np.nan), ("WaitDI in1,1;", np.nan), ("unread;", 5), ("WaitTime how_long;", np.nan),
+        ("IF ready WaitTime 1;", np.nan), ("IF ready THEN\nSetDO out1,1;\nENDIF", 5),
+    ],
+)  # fmt: skip
+def test_a_motion_before_which_the_program_waits_is_not_planned_ahead(between: str, zone: float) -> None:
+    text = "".join(LINES[:2]) + between + "\n" + "".join(LINES[2:])
+    tool = "PERS tooldata t:=[TRUE,[[0,0,200],[1,0,0,0]],[5,[0,0,80],[1,0,0,0],0,0,0]];\nVAR num i;\n"
+    routines = "PROC slow()\nWaitTime 1;\nENDPROC\nPROC quick()\nSetDO out1,1;\nENDPROC\n"
+    path = read(f"MODULE part\n{tool}PROC main()\n{text}ENDPROC\n{routines}ENDMODULE\n").toolpath
+    np.testing.assert_allclose(path.approximation * 1000, [5, zone, 5, 5])
+    assert path.stops.tolist() == [False, zone == 0, False, False]

@@ -114,6 +114,17 @@ READERS = frozenset([b"CROBT", b"CJOINTT", b"CPOS", b"PDISPON", b"EOFFSON"])
 """What reads where the robot is."""
 
 
+HALTING = frozenset(b"STOP BREAK WAITROB TPREADFK TPREADNUM UIMSGBOX".split())
+"""Instructions at which the program waits until the robot stands, or for an operator."""
+WAITING = frozenset(
+    b"WAITDI WAITDO WAITAI WAITAO WAITGI WAITGO WAITUNTIL WAITSYNCTASK WAITLOAD RECVMSG SOCKETRECEIVE SOCKETCONNECT"
+    b" SOCKETACCEPT LOAD UNLOAD".split()
+)
+"""Instructions at which it waits for what maybe is so already."""
+SHORTEST_WAIT_S = 0.2
+"""WaitTime of as much is not over when the robot, which the program is ahead of, is in the zone."""
+
+
 def is_motion(word: bytes) -> bool:
     """Whether an instruction moves the robot."""
     return word in MOTIONS or word in OTHER_MOTIONS

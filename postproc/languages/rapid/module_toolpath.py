@@ -14,6 +14,7 @@ from postproc.base.units import DEG, MM
 from postproc.languages.core.row_facts import OTHER_PATHS, follow_on, grouped, moving_external, only_used
 from postproc.languages.rapid.module_frames import ModuleFrames
 from postproc.languages.rapid.module_rows import ModuleRows, module_rows
+from postproc.languages.rapid.program_state import Waits
 from postproc.languages.rapid.propagation import Propagation
 from postproc.languages.rapid.quaternions import rotation_from_quaternion
 from postproc.languages.rapid.remarks import put_remarks
@@ -51,6 +52,7 @@ def module_toolpath(
     unknown = sorted(rows.problems)
     refused = {row: _finding(document, rows, row, *rows.problems[row]) for row in unknown}
     facts = rows.facts
+    zone, stops = _zones(rows, continues)
     toolpath = Toolpath(
         kind=kind,
         position=position,
@@ -76,8 +78,8 @@ def module_toolpath(
         ),
         configuration=Configuration({"quadrants": rows.quadrants, "cfx": rows.cfx}),
         external=rows.external,
-        approximation=rows.per_row([fact.zone * MM for fact in facts], float),
-        stops=rows.per_row([fact.stops for fact in facts], np.bool_),
+        approximation=zone,
+        stops=stops,
         continues=continues,
         predecessors={
             row: rows.before(row)
@@ -96,6 +98,21 @@ def module_toolpath(
     if moving is not None:
         findings.append(_finding(document, rows, moving[0], "RAP022", moving[1]))
     return toolpath, places, findings
+
+
+def _zones(rows: ModuleRows, continues: Bools) -> tuple[Floats, Bools]:
+    """(N,) [m] by which each motion may leave its path before the target, NaN where not known; (N,) where the robot
+    stops: where the program waits before the next motion too, whatever zone is stated."""
+    zone = rows.per_row([fact.zone * MM for fact in rows.facts], float)
+    stops = rows.per_row([fact.stops for fact in rows.facts], np.bool_)
+    for first, _, fact in rows.each():
+        if fact.waits == Waits.NO or first >= rows.never_from:
+            continue
+        before = [row for row in rows.before(first) if row >= 0 and zone[row] != 0.0]
+        surely = fact.waits == Waits.YES and bool(continues[first])
+        zone[before] = 0.0 if surely else np.nan
+        stops[before] |= surely
+    return zone, stops
 
 
 def _rotations(quaternions: Floats) -> Floats:

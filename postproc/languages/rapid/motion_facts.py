@@ -6,8 +6,16 @@ import math
 from dataclasses import dataclass, replace
 
 from postproc.languages.rapid.evaluation import Evaluator
-from postproc.languages.rapid.instructions import MotionArguments, MotionForm, sort_arguments, switch_value
-from postproc.languages.rapid.program_state import VARYING, ProgramState, Varying
+from postproc.languages.rapid.instructions import (
+    HALTING,
+    SHORTEST_WAIT_S,
+    WAITING,
+    MotionArguments,
+    MotionForm,
+    sort_arguments,
+    switch_value,
+)
+from postproc.languages.rapid.program_state import VARYING, ProgramState, Varying, Waits
 from postproc.languages.rapid.syntax_tree import Argument, Index, Instruction, Name, PlainMotions, Remark
 from postproc.languages.rapid.values import (
     Leaf,
@@ -40,7 +48,7 @@ class MotionFact:
     """A motion: ``target``, ``via``: its points (``via`` of an arc alone); speed, zone: [mm/s], [mm], NaN where not
     known; ``stops``: it ends in a stop point.  ``before``: motions after which it runs; ``checked``: the configuration
     of its target counts, None where that is not known.  ``lines``: the run of which it is the first motion, and for
-    which it represents but for the numbers of the targets."""
+    which it represents but for the numbers of the targets.  ``waits``: as in a ProgramState."""
 
     statement: Instruction
     form: MotionForm
@@ -60,6 +68,7 @@ class MotionFact:
     problem: Problem | None
     checked: bool | None
     lines: PlainMotions | None = None
+    waits: Waits = Waits.NO
 
     @property
     def count(self) -> int:
@@ -89,6 +98,7 @@ class MotionFact:
             switch=self.switch if self.switch == other.switch else VARYING,
             problem=self.problem or other.problem,
             checked=self.checked if self.checked == other.checked else None,
+            waits=self.waits if self.waits == other.waits else Waits.MAYBE,
         )
 
 
@@ -128,6 +138,7 @@ def motion_fact(
         state.switch,
         _problem(state, options),
         state.checks_joint if form.kind == Kind.PTP else state.checks_linear,
+        waits=state.waits,
     )
 
 
@@ -138,8 +149,20 @@ def not_read(statement: Instruction, form: MotionForm, state: ProgramState, mess
     return MotionFact(
         statement, form, None, unknown, unknown if form.points == 2 else None, nothing, nothing, NAN, NAN,
         False, state.orientation, state.arc, state.last, state.force, state.switch, ("RAP001", message),
-        None,
+        None, waits=state.waits,
     )  # fmt: skip
+
+
+def waits_at(step: Instruction, evaluator: Evaluator) -> Waits:
+    """Whether the program waits at an instruction."""
+    if step.name == b"WAITTIME":
+        times = [one.value for one in step.arguments if not one.name and one.value is not None]
+        seconds = number_of(evaluator.value(times[0])) if len(times) == 1 else None
+        stands = any(argument.name == b"INPOS" for argument in step.arguments)
+        return Waits.YES if stands or (seconds or 0.0) >= SHORTEST_WAIT_S else Waits.MAYBE
+    if step.name in HALTING:
+        return Waits.YES
+    return Waits.MAYBE if step.name in WAITING else Waits.NO
 
 
 def _problem(state: ProgramState, options: dict[bytes, Argument]) -> Problem | None:

@@ -22,6 +22,14 @@ class Varying(IntEnum):
 VARYING = Varying.VARYING
 
 
+class Waits(IntEnum):
+    """Whether the program waits before the next motion, so that it cannot be planned ahead."""
+
+    NO = 0
+    MAYBE = 1
+    YES = 2
+
+
 @dataclass(slots=True)
 class ProgramState:
     """``values``: of variables that are assigned anywhere; ``last``: offsets of the motions after which the robot is
@@ -40,6 +48,7 @@ class ProgramState:
     switch: Remark | Varying | None = None
     checks_linear: bool | None = True
     checks_joint: bool | None = True
+    waits: Waits = Waits.NO
 
     def copy(self) -> ProgramState:
         new = ProgramState()
@@ -74,6 +83,7 @@ class ProgramState:
             "force": self.force if self.force == other.force else VARYING,
             "checks_linear": self.checks_linear if self.checks_linear == other.checks_linear else None,
             "checks_joint": self.checks_joint if self.checks_joint == other.checks_joint else None,
+            "waits": self.waits if self.waits == other.waits else Waits.MAYBE,
             "switch": self.switch if self.switch == other.switch else VARYING,
         }
         for name_, value in merged.items():

@@ -25,8 +25,8 @@ from postproc.languages.rapid.instructions import (
     MotionForm,
     is_motion,
 )
-from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read
-from postproc.languages.rapid.program_state import ELSEWHERE, START, ProgramState
+from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read, waits_at
+from postproc.languages.rapid.program_state import ELSEWHERE, START, ProgramState, Waits
 from postproc.languages.rapid.routine_runner import RoutineRunner
 from postproc.languages.rapid.syntax_tree import (
     Argument,
@@ -242,6 +242,7 @@ class Propagation:
     def _setting(self, step: Instruction, state: ProgramState) -> None:
         name = step.name
         options = {argument.name for argument in step.arguments}
+        state.waits = max(state.waits, waits_at(step, self._evaluator(state)))
         if name in DISPLACING:
             state.displaced |= {name}
             if name in READERS:
@@ -279,13 +280,13 @@ class Propagation:
 
     def _move(self, step: Instruction, fact: MotionFact, state: ProgramState) -> None:
         self._record(step.start, fact)
-        state.last = frozenset([step.start])
+        state.last, state.waits = frozenset([step.start]), Waits.NO
 
     def _plain(self, step: PlainMotions, state: ProgramState) -> None:
         """Motions that are run one after the other."""
         fact = motion_fact(step.first, MOTIONS[step.first.name], state, self._evaluator(state))
         self._record(step.start, replace(fact, lines=step))
-        state.last = frozenset([step.last])
+        state.last, state.waits = frozenset([step.last]), Waits.NO
 
     def _record(self, at: int, fact: MotionFact) -> None:
         """Takes up the fact of the motion at an offset."""
@@ -299,6 +300,7 @@ class Propagation:
         if self._runner.recording:
             self.calls.setdefault(step.name, step.start)
         self._change(step.arguments, state)
+        state.waits = max(state.waits, Waits.MAYBE)
         if step.name.startswith(b"%"):  # any procedure, those of this file among them
             self._forget_all(self.usage.assigned, state)
             if any(_sets_modes(one) for one in self.module.routines if one not in self._active):
