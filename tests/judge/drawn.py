@@ -6,9 +6,9 @@ not see.
 
 Drawn are: link lengths, limits' branch, compliances and the spring of a KUKA arm; base, tool, robot_base; straight and
 round motions of 2 to 150 mm with corners of all angles, ramps, leaning tools, even turns of the tool; exact stops,
-C_DIS of several distances, G61 and G64; forces in all four frames with moments, steps of force, air between cuts, two
-tools and two bases; tolerances, ramps of the force.  Not drawn: what the path of a controller leaves open (PTP under
-force, free splines, tracks).
+C_DIS of several distances, stops of the advance run, G61 and G64; forces in all four frames with moments, steps of
+force, air between cuts, two tools and two bases; tolerances, ramps of the force.  Not drawn: what the path of a
+controller leaves open (PTP under force, free splines, tracks).
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from .motion import from_abc
 from .robot import rotations
 
 ABOVE = np.array([0.0, 0.0, 50.0])
+STOPS = ["WAIT SEC 0", "$OUT[3]=TRUE", "CONTINUE\n$OUT[3]=FALSE", "$VEL.CP=0.03"]
 HOME = "PTP {A1 0,A2 -90,A3 110,A4 0,A5 40,A6 0}"
 
 
@@ -50,7 +51,7 @@ def defects(outcome: Outcome) -> list[str]:
 def drawn(seed: int) -> Case:
     """The case of a seed; which of the languages, by its parity."""
     rng = np.random.default_rng(seed)
-    build, judged = _krl(rng) if seed % 2 == 0 else _gcode(rng)
+    build, judged = _krl(rng, np.random.default_rng([seed, 1])) if seed % 2 == 0 else _gcode(rng)
     name = f"drawn {seed}, {'KRL' if seed % 2 == 0 else 'G-code'}"
     return Case(name, build, judged=judged)
 
@@ -153,7 +154,9 @@ def _pose(place: np.ndarray, walk: _Walk) -> str:
     return f"{{X {x:.3f},Y {y:.3f},Z {z:.3f},A {a:.4f},B {b:.4f},C {c:.4f}}}"
 
 
-def _krl(rng: np.random.Generator) -> tuple[Callable[[Path], Path], str]:
+def _krl(rng: np.random.Generator, stops: np.random.Generator) -> tuple[Callable[[Path], Path], str]:
+    """stops: draws where the program stops its advance run, in one of three programs."""
+    stopping = 0.2 if stops.random() < 1 / 3 else 0.0
     tools = int(rng.integers(1, 3))
     style = rng.choice(["exact", "flowing", "mixed"], p=[0.3, 0.5, 0.2])
     lines: list[str] = []
@@ -179,6 +182,8 @@ def _krl(rng: np.random.Generator) -> tuple[Callable[[Path], Path], str]:
                 lines.append(f"CIRC {_pose(via, walk)},{_pose(end, walk)}{suffix}")
             else:
                 lines.append(f"LIN {_pose(end, walk)}{suffix}")
+            if stops.random() < stopping:
+                lines += stops.choice(STOPS).split("\n")
         lines.append(f"LIN {_pose(walk.step(), walk)}")
         lines += [";FORCE OFF", f"LIN {_pose(walk.place + ABOVE, walk)}"]
     cell, arm = _cell(rng, tools), _arm(rng)
