@@ -49,7 +49,7 @@ class ExecutionContext:
     structure is not understood.  ``spline``: the spline block that is open.  ``has_tcp_mode``, ``has_turning``: some
     line names another interpolation mode, or another way of turning the tool, than the usual one.  ``initial``: what
     holds where the program starts.  ``root_set``, ``later_since``, ``later_speed``: what ``ModalState`` calls
-    so.  ``others``: the modules that are read besides; ``effects_of_others``: what their routines
+    so, and ``moved_later``, ``ended_later``.  ``others``: the modules that are read besides; ``effects_of_others``: what their routines
     change of what this one knows; ``unread``: routines that are called and not read; ``depth``:
     how many calls of other modules lead here.
     """
@@ -81,6 +81,8 @@ class ExecutionContext:
     root_set: int = 0
     later_since: int = 0
     later_speed: frozenset[Effect] = frozenset()
+    moved_later: int = 0
+    ended_later: int = 0
     unread: set[bytes] = field(default_factory=set)
     depth: int = 0
 
@@ -99,6 +101,13 @@ class ExecutionContext:
             self.later_since = self.later_since or line
         self.later_speed |= effects & {"feed", "apo"}
         self.state.later_speed |= self.later_speed
+        if "point" in effects:
+            self.moved_later = self.moved_later or line
+            self.state.moved_later = self.state.moved_later or line
+            self.state.unsettle(self.has_tcp_mode, self.has_turning)
+        if "resume" in effects:
+            self.ended_later = self.ended_later or line
+            self.state.ended_later = self.state.ended_later or line
 
     def named(self) -> set[bytes]:
         """The names that anything asked for or made unknown: no literal of theirs is changed for one motion alone."""

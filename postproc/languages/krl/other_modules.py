@@ -118,6 +118,8 @@ class OtherModules:
         survey.later |= later - own
         for module, _ in self.routines.values():
             module.survey.table_entries |= survey.table_entries
+            for name in module.survey.later & self.effects.keys():
+                module.survey.later_effects |= {one for one in self.effects[name] if isinstance(one, str)}
             module.survey.later |= later - module.declarations.types.keys() | module.shared_later
 
     def directions(self) -> dict[bytes, tuple[bool, ...]]:

@@ -132,7 +132,8 @@ class ProgramFlow(Calls):
         run.rows.sources[mark].add(ELSEWHERE)
         run.state = ModalState(sources=frozenset([mark]))
         run.state.root_set, run.state.later_since = run.root_set, run.later_since
-        run.state.later_speed = run.later_speed
+        run.state.later_speed, run.state.ended_later = run.later_speed, run.ended_later
+        run.state.moved_later = run.moved_later
         run.walked = True
         run.forget(EVERYTHING - {"all"}, f"at the start of the subprogram of line {routine.line}")
         run.routine = routine
@@ -140,6 +141,8 @@ class ProgramFlow(Calls):
         first = len(run.rows)
         self._run(routine)
         run.walked_rows.append((first, len(run.rows), routine))
+        if run.ended_later:
+            run.rows.left_from |= set(range(first, len(run.rows)))
         run.walked = False
 
     def _idle(self) -> None:
@@ -292,7 +295,7 @@ class ProgramFlow(Calls):
         run.expect_later(run.survey.later_effects, item.line)
         for name, _ in LATER.findall(item.code):
             name = name.upper()
-            if name + b"(" in item.code.upper().replace(b" ", b"") and name not in run.survey.routines:
+            if name != b"BAS" and name + b"(" in item.code.upper().replace(b" ", b"") and name not in run.survey.routines:
                 self._unread(item, name)
 
     def _report_letters(self, item: Statement) -> None:

@@ -29,6 +29,7 @@ from postproc.languages.krl.statement_effects import (
     Effects,
     declared_external,
     effects_of,
+    effects_of_bas,
     effects_of_unknown,
     entries_given,
     functions_of,
@@ -328,6 +329,9 @@ class _Surveyor:
         if statement.word in (b"INTERRUPT", b"TRIGGER", b"GLOBAL"):
             for name, given in LATER.findall(statement.code):
                 call = Call(name.upper(), given)
+                if call.name == b"BAS":
+                    found.later_effects |= effects_of_bas(given)
+                    continue
                 changed = returned_by(call, found.directions)
                 found.later |= {call.name, *(effect for effect in changed if isinstance(effect, bytes))}
                 found.later_effects |= {effect for effect in changed if isinstance(effect, str)}
