@@ -1,13 +1,13 @@
 """Random statements whose effect comes at a time of its own, and the routines that they run.
 
-    later     = TRIGGER WHEN DISTANCE|PATH=.. DELAY=.. DO does, probe probe
-              | declared, motion, INTERRUPT ON n, probe, INTERRUPT OFF n, probe
-              | declared, INTERRUPT ON n, call, INTERRUPT OFF n, probe probe
-              | INTERRUPT ON|OFF|ENABLE|DISABLE, with a number or for all
-    declared  = INTERRUPT DECL n WHEN input DO does; GLOBAL before it, or not; in the program and in subprograms
-    does      = change | a call of an event routine or of a subprogram, with what a call takes, PRIO=n or PRIO=-1
-    change    = a frame, a table entry, a load, a variable or a component of one gets a value
-    event     = DEF ir(v:IN,w) changes block END; BRAKE before it, RESUME after it, behind an IF, or not at all
+later     = TRIGGER WHEN DISTANCE|PATH=.. DELAY=.. DO does, probe probe
+          | declared, motion, INTERRUPT ON n, probe, INTERRUPT OFF n, probe
+          | declared, INTERRUPT ON n, call, INTERRUPT OFF n, probe probe
+          | INTERRUPT ON|OFF|ENABLE|DISABLE, with a number or for all
+declared  = INTERRUPT DECL n WHEN input DO does; GLOBAL before it, or not; in the program and in subprograms
+does      = change | a call of an event routine or of a subprogram, with what a call takes, PRIO=n or PRIO=-1
+change    = a frame, a table entry, a load, a variable or a component of one gets a value
+event     = DEF ir(v:IN,w) changes block END; BRAKE before it, RESUME after it, behind an IF, or not at all
 """
 
 from __future__ import annotations
@@ -131,6 +131,8 @@ class Later(Data):
         self.names.ints.append("v")
         self.names.reals.append("w")
         body = [*self.changes(), *self.block(2, rng.randint(0, 2))] if rng.random() < 0.5 else []
-        ends = rng.choice([[], ["RESUME"], ["RESUME"], ["RESUME"], [f"IF {self.condition()} THEN", "RESUME", "ENDIF"]])
+        ends = rng.choice(
+            [[], ["RESUME"], ["RESUME"], ["RESUME"], [f"IF {self.condition()} THEN", "RESUME", "ENDIF"]]
+        )
         brake = rng.choice([[], ["BRAKE"], ["BRAKE F"]])
         self.lines += ["INT v", "DECL REAL w", *own, *brake, *body, *ends, "END"]

@@ -487,7 +487,8 @@ class Generator(Later):
             *own,
             *self.changes(),
             *self.block(1, rng.randint(1, 5)),
-            *[*self.frame(), *self.probe(), *self.probe(), *self.frame()] * (self.calm and rng.random() < 0.7),
+            *[*self.frame(), *self.probe(), *self.probe(), *self.frame()]
+            * (self.calm and rng.random() < 0.7),
             "END",
         ]
 

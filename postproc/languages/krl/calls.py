@@ -15,7 +15,8 @@ from postproc.languages.krl.flow_frames import BlockFrame, LabelHead, Restart
 from postproc.languages.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, split_values
 from postproc.languages.krl.modal_state import ELSEWHERE, TRIGGERED, ModalState
 from postproc.languages.krl.other_modules import RoutineExit, take_exit
-from postproc.languages.krl.program_structure import MOST_EFFECTS, Routine, callers, closure
+from postproc.languages.krl.program_blocks import Routine
+from postproc.languages.krl.program_structure import MOST_EFFECTS, callers, closure
 from postproc.languages.krl.statement_effects import (
     EVERYTHING,
     PATH_FROM_FILE,

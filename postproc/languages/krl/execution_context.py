@@ -14,7 +14,8 @@ from postproc.languages.krl.lexing import Statement
 from postproc.languages.krl.modal_state import ZERO, FrameRegister, ModalState, Record, joined
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.other_modules import OtherModules
-from postproc.languages.krl.program_structure import Block, ProgramStructure, Routine
+from postproc.languages.krl.program_blocks import Block, Routine
+from postproc.languages.krl.program_structure import ProgramStructure
 from postproc.languages.krl.statement_effects import Effect, Effects
 from postproc.languages.krl.target import UnknownValue, known, shown
 from postproc.languages.krl.variables import VariableFacts, Variables
@@ -48,10 +49,10 @@ class ExecutionContext:
     ``followed``: routines that ran.  ``idle``: what no flow leads to is listed.  ``opaque``: the block, if any, whose
     structure is not understood.  ``spline``: the spline block that is open.  ``has_tcp_mode``, ``has_turning``: some
     line names another interpolation mode, or another way of turning the tool, than the usual one.  ``initial``: what
-    holds where the program starts.  ``root_set``, ``later_since``, ``later_speed``: what ``ModalState`` calls
-    so, and ``moved_later``, ``ended_later``.  ``others``: the modules that are read besides; ``effects_of_others``: what their routines
-    change of what this one knows; ``unread``: routines that are called and not read; ``depth``:
-    how many calls of other modules lead here.
+    holds where the program starts.  ``root_set``, ``later_since``, ``later_speed``, ``moved_later``,
+    ``ended_later``: what ``ModalState`` calls so.  ``others``: the modules read besides; ``effects_of_others``:
+    what their routines change of what this one knows; ``unread``: routines that are called and not read; ``depth``: how
+    many calls of other modules lead here.
     """
 
     document: Document

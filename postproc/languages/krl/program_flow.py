@@ -39,7 +39,8 @@ from postproc.languages.krl.other_modules import (
     state_at_entry,
     visible,
 )
-from postproc.languages.krl.program_structure import INLINE, LATER, Routine, closure
+from postproc.languages.krl.program_blocks import Routine
+from postproc.languages.krl.program_structure import INLINE, LATER, closure
 from postproc.languages.krl.statement_effects import EVERYTHING, HIDDEN, effects_of, effects_of_unknown
 from postproc.languages.krl.vectorised import Item, VectorisedLines
 from postproc.toolpath import Annotation
@@ -295,7 +296,9 @@ class ProgramFlow(Calls):
         run.expect_later(run.survey.later_effects, item.line)
         for name, _ in LATER.findall(item.code):
             name = name.upper()
-            if name != b"BAS" and name + b"(" in item.code.upper().replace(b" ", b"") and name not in run.survey.routines:
+            if name == b"BAS" or name in run.survey.routines:
+                continue
+            if name + b"(" in item.code.upper().replace(b" ", b""):
                 self._unread(item, name)
 
     def _report_letters(self, item: Statement) -> None:

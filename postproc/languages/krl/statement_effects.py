@@ -1,7 +1,8 @@
 """What a statement changes, reads and calls.
 
 An effect is a word ("point", "base", "tool", "feed", "apo", "mode", "turning", "root", "record", "resume" for the end
-of calls that are under way, "all" for every variable that the program assigns) or the name (bytes) of a variable that is assigned.
+of calls that are under way, "all" for every variable that the program assigns) or the name (bytes) of a variable that
+is assigned.
 """
 
 from __future__ import annotations
