@@ -18,12 +18,11 @@ from postproc.languages.krl.external_axes import carried_on, reached, stated
 from postproc.languages.krl.lexing import LONGEST, Statement
 from postproc.languages.krl.modal_state import Source
 from postproc.languages.krl.motion_rows import FEW, NAN6, NO_ARC, MotionRow, MotionRows, RowRefusal
+from postproc.languages.krl.program_blocks import Block, Routine
 from postproc.languages.krl.program_structure import (
     DEEPEST,
     MOST_EFFECTS,
-    Block,
     ProgramStructure,
-    Routine,
     program_structure,
 )
 from postproc.languages.krl.scan import FEWEST, MOST, scan

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from .motions import Six
 from .values import FRAME, matrix
 
 Tables = dict[str, dict[int, Six]]
+_ENTRY = re.compile(r"\b(BASE_DATA|TOOL_DATA)\s*\[\s*(\d+)", re.I)
 NEVER_RUNS = "KRL023"
 _ROUTINE = re.compile(r"^[ \t]*(?:GLOBAL[ \t]+)?DEF(?:FCT[ \t]+\w+)?[ \t]+(\w+)", re.I | re.M)
 
@@ -57,6 +58,7 @@ def read_claims(src: str, dat: str, config: str, tables: Tables) -> list[Claim]:
         documents.append(Document(Path("part.dat"), dat.encode("latin-1")))
     references = (Document(Path("$config.dat"), config.encode("latin-1")),) if config else ()
     program = DIALECTS["krl"].read(tuple(documents), ReadingSettings(references=references))
+    tables = _without_stated(tables, config)
     return [_claim(program.toolpath, row, tables) for row in range(len(program.toolpath))]
 
 
@@ -68,7 +70,14 @@ def read_split_claims(src: str, dat: str, config: str, tables: Tables) -> list[C
     siblings = tuple(Document(Path(name), text.encode("latin-1")) for name, text in others)
     document = Document(Path("part.src"), main.encode("latin-1"))
     program = DIALECTS["krl"].read((document,), ReadingSettings(siblings=siblings))
+    tables = _without_stated(tables, config)
     return [_claim(program.toolpath, row, tables) for row in range(len(program.toolpath))]
+
+
+def _without_stated(tables: Tables, config: str) -> Tables:
+    """The tables of the cell: not what the controller's own file says of an entry, or says so that it is not known."""
+    stated = {(name.upper(), int(n)) for name, n in _ENTRY.findall(config)}
+    return {name: {n: of[n] for n in of if (name, n) not in stated} for name, of in tables.items()}
 
 
 def split(src: str) -> tuple[str, dict[str, str]]:
@@ -111,7 +120,10 @@ def _frame(frames: tuple[FrameRef, ...], index: int, table: dict[int, Six]) -> n
         return None
     frame = frames[index]
     if frame.pose is None:
-        return matrix(dict(zip(FRAME, table[frame.number], strict=True)))
+        if frame.declared is None:
+            stated = table.get(frame.number)
+            return None if stated is None else matrix(dict(zip(FRAME, stated, strict=True)))
+        frame = replace(frame, pose=frame.declared)
     out = np.eye(4)
     out[:3, :3], out[:3, 3] = frame.pose.rotation, frame.pose.position / MM
     return out

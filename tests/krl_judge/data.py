@@ -29,9 +29,16 @@ class Data(Operands):
         return [*out, "ENDDAT"]
 
     def config(self) -> list[str]:
-        return [
-            "DEFDAT $CONFIG",
-            f"DECL E6POS XC1={self.aggregate(plain=True)}",
-            "DECL REAL DEF_VEL_CP=2.5",
-            "ENDDAT",
-        ]
+        """Half of them state entries of the tables, some one of them twice."""
+        rng = self.rng
+        out = ["DEFDAT $CONFIG", f"DECL E6POS XC1={self.aggregate(plain=True)}", "DECL REAL DEF_VEL_CP=2.5"]
+        out.append("DECL LOAD LOAD_DATA[16]")
+        for n in range(1, 5):
+            centre = "CM {X 1.0,Y 2.0,Z 3.0,A 0.0,B 0.0,C 0.0},J {X 0.1,Y 0.1,Z 0.1}"
+            out.append(f"LOAD_DATA[{n}]={{M {self.number(1, 9)},{centre}}}")
+        if rng.random() < 0.5:
+            for table in ("BASE_DATA", "TOOL_DATA"):
+                stated = rng.sample(range(1, 9), rng.randint(1, 8))
+                out += [f"{table}[{n}]={self.aggregate(plain=True)}" for n in stated]
+                out += [f"{table}[{stated[-1]}]={self.aggregate(plain=True)}"] * (rng.random() < 0.1)
+        return [*out, "ENDDAT"]

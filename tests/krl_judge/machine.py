@@ -2,7 +2,7 @@
 
 Written from the description of the language.  Where that leaves something open (the counter of a FOR after its end,
 what a partial point keeps under another base), values become undetermined; where they decide what comes next, it stops.
-What a TRIGGER or an INTERRUPT does comes at a time of its own: so many motions later as the inputs of the run say.
+What a TRIGGER or an INTERRUPT does comes at a time of its own: see ``events``.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from .evaluate import evaluate
-from .motions import NAN, Executed, Six
+from .events import Events, Resumed
+from .motions import NAN, End, Executed, Six
 from .robot import ZERO, Motion, Robot
 from .syntax import CLOSES, LOOPS, Line, Reader, Routine, tokens
 from .values import (
@@ -90,18 +91,18 @@ def run(code: list[Routine], memory: Memory, inputs: Inputs) -> Run:
         machine.run_routine(machine.routines[0], {})
     except Stop as stop:
         stopped = str(stop)
+    except Resumed:
+        stopped = "RESUME after the end of the routine that declares the interrupt"
     return Run(tuple(machine.robot.executed), stopped, bool(machine.reads))
 
 
-class Machine:
+class Machine(Events):
     def __init__(self, of: list[Routine], memory: Memory, inputs: Inputs) -> None:
+        super().__init__(sum(sum(shown) for shown in inputs.values()) % 4)
         self.routines, self.memory, self.inputs = of, memory, inputs
         self.reads: dict[int, int] = {}
         self.scopes: list[Scope] = []
         self.steps = 0
-        self.delay = sum(sum(shown) for shown in inputs.values()) % 4
-        self.waiting: list[tuple[int, int, tuple[tuple, tuple]]] = []
-        self.interrupts: dict[int, tuple[tuple, tuple]] = {}
         self.robot = Robot(memory.cells)
         self.system = self.robot.system
 
@@ -161,6 +162,10 @@ class Machine:
     # routines
 
     def call(self, name: str, arguments: list) -> object:
+        if name == "BAS":
+            values = [0 if tree is None else self.value(tree) for tree in (*arguments, None)]
+            self.robot.bas(*values[:2])
+            return None
         routine = next((r for r in self.routines if r.name == name), None)
         if routine is None:
             raise Stop(f"{name} is not there")
@@ -188,7 +193,7 @@ class Machine:
                 self.steps += 1
                 if self.steps > MOST_STEPS:
                     raise Stop("it does not come to an end")
-                at = self.execute(scope, routine.lines[at], at)
+                at = self.step(scope, routine.lines[at], at)
         except _Return as back:
             if routine.result:
                 result = Cell(routine.result)
@@ -197,6 +202,7 @@ class Machine:
             return None
         finally:
             self.scopes.pop()
+            self.forget_events(scope)
         if routine.result:
             raise Stop("a function without RETURN")
         return None
@@ -255,66 +261,33 @@ class Machine:
 
     # statements
 
-    def later(self, action: tuple[tuple, tuple], interrupt: int = -1) -> None:
-        """Notes an assignment that comes some motions later."""
-        self.waiting.append((len(self.robot.executed) + self.delay, interrupt, action))
-
-    def come_due(self) -> None:
-        now = len(self.robot.executed)
-        due = [action for when, _, action in self.waiting if when <= now]
-        self.waiting = [waiting for waiting in self.waiting if waiting[0] > now]
-        for place, value in due:
-            assign(self.cell(place), self.value(value), UNDETERMINED)
-
-    def trigger(self, reader: Reader) -> None:
-        reader.take()
-        reader.expect("WHEN")
-        if not reader.accept("DISTANCE"):
-            reader.expect("PATH")
-        reader.expect("=")
-        self.value(reader.expression())
-        reader.expect("DELAY")
-        reader.expect("=")
-        self.value(reader.expression())
-        reader.expect("DO")
-        self.later(self.action(reader))
-
-    def action(self, reader: Reader) -> tuple[tuple, tuple]:
-        place = reader.place(reader.name())
-        reader.expect("=")
-        value = reader.expression()
-        reader.end()
-        return place, value
-
-    def interrupt(self, reader: Reader) -> None:
-        reader.take()
-        if reader.accept("DECL"):
-            number = self.whole(reader.expression())
-            reader.expect("WHEN")
-            reader.expression()
-            reader.expect("DO")
-            self.interrupts[number] = self.action(reader)
-            return
-        is_on = reader.accept("ON")
-        if not is_on:
-            reader.expect("OFF")
-        number = self.whole(reader.expression())
-        if number not in self.interrupts:
-            raise Stop("no such interrupt")
-        self.waiting = [waiting for waiting in self.waiting if waiting[1] != number]
-        if is_on:
-            self.later(self.interrupts[number], number)
+    def step(self, scope: Scope, line: Line, at: int) -> int:
+        """Executes the statement ``at``, or what an event does before it; the place of the next one."""
+        try:
+            self.come_due()
+        except Resumed as ended:
+            if ended.scope is scope:
+                raise Stop("RESUME where no subprogram runs") from None
+            raise
+        try:
+            return self.execute(scope, line, at)
+        except Resumed as ended:
+            if ended.scope is not scope:
+                raise
+            if line.block or line.tokens[1:2] != [("op", "(")]:
+                raise Stop("RESUME in a function") from None
+            self.robot.end = End()
+            return at + 1
 
     def execute(self, scope: Scope, line: Line, at: int) -> int:
         """Executes the statement ``at``; the place of the next one."""
-        self.come_due()
         reader = line.reader()
         word = line.word
         following = line.tokens[1][1] if len(line.tokens) > 1 else ""
         if word == ";label":
             return at + 1
         if following in ("=", ".", "[") and word not in ("DECL",):
-            cell = self.assigned(reader)
+            cell = self.assigned(reader.place(reader.name()))
             reader.expect("=")
             value = self.value(reader.expression())
             reader.end()
@@ -339,12 +312,14 @@ class Machine:
         elif word == "RETURN":
             reader.take()
             raise _Return(self.value(reader.expression()) if reader.kind != "end" else None)
-        elif word in ("HALT", "CONTINUE", "SPLINE", "ENDSPLINE"):
+        elif word in ("HALT", "CONTINUE", "SPLINE", "ENDSPLINE", "BRAKE"):
             pass
+        elif word == "RESUME":
+            self.resume()
         elif word == "TRIGGER":
-            self.trigger(reader)
-        elif word == "INTERRUPT":
-            self.interrupt(reader)
+            self.trigger(reader, scope)
+        elif word == "INTERRUPT" or (word == "GLOBAL" and following == "INTERRUPT"):
+            self.interrupt(reader, scope)
         elif word == "WAIT":
             reader.take()
             if reader.accept("FOR"):
@@ -356,18 +331,13 @@ class Machine:
             reader.take()
             arguments = reader.arguments()
             reader.end()
-            if word == "BAS":
-                values = [0 if tree is None else self.value(tree) for tree in (*arguments, None)]
-                self.robot.bas(*values[:2])
-            else:
-                self.call(word, arguments)
+            self.call(word, arguments)
         else:
             raise Stop(f"what is {word}?")
         return at + 1
 
-    def assigned(self, reader: Reader) -> Cell | None:
+    def assigned(self, tree: tuple) -> Cell | None:
         """The place that an assignment writes; None for what does not matter."""
-        tree = reader.place(reader.name())
         name = tree
         while name[0] != "name":
             name = name[1]

@@ -216,4 +216,66 @@ MISREADINGS = (
             inputs=({}, {1: (True,)}),
         ),
     ),
+    Misreading(
+        "moved by an event",
+        "A subprogram that an interrupt or a trigger runs moves the robot: the motion behind starts where that ends,"
+        " and what a partial point or a relative motion keeps is not known.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "TRIGGER WHEN DISTANCE=0 DELAY=0 DO away() PRIO=-1\n"
+            "LIN {X 2,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "LIN {X 3}\n"
+            "LIN {X 4,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n"
+            "DEF away()\n"
+            "LIN {X 9,Y 9,Z 9,A 4,B 5,C 6}\n"
+            "END\n",
+            inputs=({}, {1: (True,)}, {1: (True, True)}),
+        ),
+    ),
+    Misreading(
+        "ended by RESUME",
+        "An interrupt may end a subprogram anywhere: what that sets behind, and where its last motion leads, is said to"
+        " hold after the call.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "INTERRUPT DECL 3 WHEN $IN[1] DO stop()\n"
+            "INTERRUPT ON 3\n"
+            "sub()\n"
+            "INTERRUPT OFF 3\n"
+            "LIN {X 7,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n"
+            "DEF sub()\n"
+            "BAS(#BASE,2)\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "LIN {X 2,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "BAS(#BASE,3)\n"
+            "END\n"
+            "DEF stop()\n"
+            "BRAKE\n"
+            "RESUME\n"
+            "END\n",
+            inputs=({1: (True,)}, {1: (True, True)}, {1: (True, True, True)}),
+        ),
+    ),
+    Misreading(
+        "BAS of an event",
+        "An interrupt calls BAS itself, which is said not to be read and to leave base and tool.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "INTERRUPT DECL 3 WHEN $IN[1] DO BAS(#BASE,3)\n"
+            "INTERRUPT ON 3\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "LIN {X 2,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n",
+            inputs=({1: (True,)},),
+        ),
+    ),
 )

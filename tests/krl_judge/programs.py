@@ -1,6 +1,6 @@
 """Random programs of KRL.
 
-    program    = DEF part() declarations settings block END subprogram* function?
+    program    = DEF part() declarations settings block END subprogram* event* function?
     block      = statement+
     statement  = motion | frame | assignment | if | switch | for | while | repeat | loop | call | jump | state | form
                | later | spline
@@ -15,8 +15,7 @@
     while ..   = a counter, or inputs, with EXIT in them
     call       = subprogram with parameters :IN and :OUT, with and without motions, that set frames or module variables;
                  what comes back is a variable, a component, an element with a computed index, a frame or speed in force
-    later      = TRIGGER WHEN DISTANCE|PATH=.. DELAY=.. DO change; INTERRUPT DECL n WHEN input DO change, ON, OFF;
-                 change = a frame, a table entry, a variable or a component of one gets a value
+    later      = triggers and interrupts: see ``later``
     spline     = SPLINE, then SPL and SLIN to full and partial points, ENDSPLINE
     jump       = IF .. THEN GOTO over what follows, or back as long as a counter or an input says
     form       = an inline form: FDAT, LDAT or PDAT, BAS(#CP_PARAMS,..), a point of the .dat
@@ -27,24 +26,27 @@ Every local variable is set before it is read, as far as the flow does not skip 
 
 from __future__ import annotations
 
-from .data import MODULE_FRAMES, MODULE_INTS, MODULE_REALS, Data
+from .data import MODULE_FRAMES, MODULE_INTS, MODULE_REALS
 from .judge import Case
+from .later import Later
 from .operands import INPUTS, Names
 from .spelling import Spelling
 
 
-class Generator(Data):
+class Generator(Later):
     def __init__(self, seed: int) -> None:
         super().__init__(seed)
         self.lines: list[str] = []
         self.labels = 0
         self.module = self.rng.random() < 0.5
-        self.has_later = self.rng.random() < 0.25
+        self.has_later = self.rng.random() < 0.4
+        self.calm = self.has_later and self.rng.random() < 0.6
 
     def case(self) -> Case:
         rng = self.rng
         self.subprograms = rng.choice([0, 1, 1, 2, 3])
         self.takes_frame = [rng.choice(["", "", "IN", "OUT"]) for _ in range(self.subprograms)]
+        self.event_routines = rng.choice([0, 1, 1, 2]) if self.has_later else 0
         self.has_function = rng.random() < 0.2
         self.frame_type = "FRAME" if "OUT" in self.takes_frame else rng.choice(["FRAME", "POS", "E6POS"])
         if rng.random() < 0.3:
@@ -52,6 +54,8 @@ class Generator(Data):
         self.main()
         for number in range(1, self.subprograms + 1):
             self.subprogram(number)
+        for number in range(1, self.event_routines + 1):
+            self.event_routine(number)
         if self.has_function:
             does = rng.choice(
                 [[], [], ["mi=mi+1"], ["BAS(#BASE,2)"], ["$TOOL=TOOL_DATA[3]"], ["LIN {Z 5}"], ["mr=v"]]
@@ -60,7 +64,7 @@ class Generator(Data):
         spelling = Spelling(rng)
         src = "".join(spelling.line(line) + "\n" for line in self.lines)
         dat = "".join(spelling.line(line) + "\n" for line in self.dat())
-        config = "".join(line + "\n" for line in self.config())
+        config = "".join(spelling.line(line) + "\n" for line in self.config())
         return Case(src, dat, config, self.runs())
 
     def runs(self) -> tuple[dict[int, tuple[bool, ...]], ...]:
@@ -139,8 +143,10 @@ class Generator(Data):
         if kind < 0.88:
             value = f"={self.aggregate()}" if kind < 0.84 else f".{rng.choice('XYZ')}={self.number()}"
             return [f"{table}[{n}]{value}", *[f"{name}={table}[{n}]", *self.probe()] * (rng.random() < 0.5)]
-        if kind < 0.94:
+        if kind < 0.93:
             return [f"{name}={table}[{n}]:{self.aggregate()}"]
+        if kind < 0.95:
+            return [rng.choice([f"$LOAD=LOAD_DATA[{n}]", f"LOAD_DATA[{n}].M={self.real()}"])]
         return [f"{name}={rng.choice(['$NULLFRAME', '$WORLD'])}" if name == "$BASE" else f"{name}=$NULLFRAME"]
 
     def assignment(self) -> list[str]:
@@ -244,6 +250,8 @@ class Generator(Data):
                 out += self.spline()
             elif kind < 0.76 and self.has_later:
                 out += self.later()
+            elif self.calm:
+                out += self.probe()
             elif depth < 3:
                 size -= 1
                 out += self.rng.choice(
@@ -401,40 +409,6 @@ class Generator(Data):
         ]
         return rng.choice(places)
 
-    def later(self) -> list[str]:
-        """A change that comes at a time of its own."""
-        rng, names = self.rng, self.names
-        changes = [
-            f"{rng.choice(names.reals)}={self.number(0, 50)}",
-            "$BASE=BASE_DATA[2]",
-            "$TOOL=TOOL_DATA[3]",
-        ]
-        changes += [f"{name}={self.aggregate(plain=True)}" for name in names.frames[:2]]
-        changes += [f"{name}.X={self.number()}" for name in names.frames[:1]]
-        changes += [
-            f"BASE_DATA[1].X={self.number()}",
-            "$VEL.CP=0.25",
-            f"list[1]={self.aggregate(plain=True)}",
-        ]
-        change = rng.choice(changes)
-        if rng.random() < 0.6:
-            where = rng.choice(["DISTANCE=0", "DISTANCE=1", "PATH=-5"])
-            return [
-                f"TRIGGER WHEN {where} DELAY={rng.randint(0, 20)} DO {change}",
-                *self.probe(),
-                *self.probe(),
-            ]
-        number = rng.randint(1, 30)
-        declared = f"INTERRUPT DECL {number} WHEN $IN[{rng.choice(INPUTS)}]==TRUE DO {change}"
-        return [
-            declared,
-            *self.motion(),
-            f"INTERRUPT ON {number}",
-            *self.probe(),
-            f"INTERRUPT OFF {number}",
-            *self.probe(),
-        ]
-
     def spline(self) -> list[str]:
         rng = self.rng
         inner = [f"{rng.choice(['SPL', 'SPL', 'SLIN'])} {self.target()}" for _ in range(rng.randint(1, 4))]
@@ -491,6 +465,8 @@ class Generator(Data):
                 [["PTP {A1 0,A2 -90,A3 90,A4 0,A5 45,A6 0}"], [f"PTP {self.aggregate(plain=True)}"]]
             )
         self.lines += self.block(0, rng.randint(4, 14))
+        if self.calm and self.event_routines and self.subprograms and rng.random() < 0.7:
+            self.lines += self.interrupted_call()
         self.lines.append("END")
 
     def subprogram(self, number: int) -> None:
@@ -511,6 +487,8 @@ class Generator(Data):
             *own,
             *self.changes(),
             *self.block(1, rng.randint(1, 5)),
+            *[*self.frame(), *self.probe(), *self.probe(), *self.frame()]
+            * (self.calm and rng.random() < 0.7),
             "END",
         ]
 

@@ -12,7 +12,7 @@ from .values import AXES, FRAME, STRUCTURES, UNDETERMINED, Cell, Stop, assign, c
 ZERO = dict.fromkeys(FRAME, 0.0)
 SYSTEM = {
     "$BASE": "FRAME", "$TOOL": "FRAME", "$VEL": "CP", "$APO": "APO", "$ORI_TYPE": "word", "$CIRC_TYPE": "word",
-    "$IPO_MODE": "word", "$ADVANCE": "INT", "FDAT_ACT": "FDAT", "LDAT_ACT": "LDAT", "PDAT_ACT": "PDAT",
+    "$IPO_MODE": "word", "$ADVANCE": "INT", "FDAT_ACT": "FDAT", "LDAT_ACT": "LDAT", "PDAT_ACT": "PDAT", "$LOAD": "LOAD",
 }  # fmt: skip
 
 

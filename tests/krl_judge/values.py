@@ -34,6 +34,8 @@ STRUCTURES: dict[str, dict[str, str]] = {
     "E6POS": {**dict.fromkeys(FRAME + EXTERNAL, REAL), "S": INT, "T": INT},
     "AXIS": dict.fromkeys(AXES, REAL),
     "E6AXIS": dict.fromkeys(AXES + EXTERNAL, REAL),
+    "INERTIA": dict.fromkeys(FRAME[:3], REAL),
+    "LOAD": {"M": REAL, "CM": "FRAME", "J": "INERTIA"},
     "CP": dict.fromkeys(("CP", "ORI1", "ORI2"), REAL),
     "APO": dict.fromkeys(("CPTP", "CDIS", "CORI", "CVEL"), REAL),
     "FDAT": {"TOOL_NO": INT, "BASE_NO": INT, "IPO_FRAME": WORD, "POINT2": CHAR},

@@ -143,7 +143,7 @@ CODES = define(
         "GCO015": Code(
             "warning",
             "tool is not known",
-            meaning="No tool is loaded, or its number is not known.",
+            meaning="No tool is loaded, or its number is not known, or the program itself writes its length.",
             consequence="Length and load of the tool are unknown, so the motion is not corrected.",
             action="Load a tool by number before the cut.",
             example="`T#5 M6`.",

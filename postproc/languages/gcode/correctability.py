@@ -152,9 +152,9 @@ def check_correctability(
         "GCO003",
         "the work offset of this rapid is not known, or the program itself writes it",
     )
-    refuse(air & (tool < 0), "GCO003", "this rapid has no tool, or its number is not known")
+    refuse(air & (tool < 0), "GCO003", "this rapid has no tool, or its number or length is not known")
     refuse(base < 0, "GCO014", "the work offset is not known, or the program itself writes it")
-    refuse(tool < 0, "GCO015", "no tool is loaded, or its number is not known")
+    refuse(tool < 0, "GCO015", "no tool is loaded, or its number or length is not known")
     refuse(force[Group.UNITS] < 0, "GCO002", "mm or inch is not known")
     _positions(given, moves, where, collector, reasons)
     for wrong, message in ARCS.items():

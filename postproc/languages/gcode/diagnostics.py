@@ -96,6 +96,11 @@ def diagnostics(
         "GCO024",
         "the program writes a work offset; the cell's base of its number is used",
     )
+    add(
+        given.noted("tool data"),
+        "GCO024",
+        "the program writes data of tools; the cell's tool of the same number is used",
+    )
     named_tools: dict[str, list[int]] = {}
     for note in given.source.notes:
         if note.kind == "tool":

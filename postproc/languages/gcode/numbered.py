@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,12 @@ SYSTEM = ((5201, 5400), (7001, 7999), (14001, 20000))
 
 _BASE_FRAME = re.compile(r"\$P_(?:(?!PFRAME)[A-Z]*FRAME|UBFR|CHBFR|NCBFR)(?![A-Z])", re.I)
 """Variables of a Sinumerik that move all work offsets; $P_UIFR is one of these, $P_PFRAME the programmed frame."""
+_WRITTEN_BASE = re.compile(r"\$P_UIFR(?:[ \t]*+\[[ \t]*+(\d{1,4}+)[ \t]*+[\],])?+", re.I)
+_WRITTEN_TOOL = re.compile(
+    r"(?!\$TC_(?:DP(?:1|6|7|8|9|10|11|15|16|17|18|19|20|24|25)|DPCE|DPH|TP\d*|MOP\w*+)[ \t]*+\[)"
+    r"\$TC_\w++(?:[ \t]*+\[[ \t]*+(\d{1,9}+)[ \t]*+[\],])?+", re.I
+)  # fmt: skip
+"""Data of a tool, but for what moves nothing: its type, radius, corners, wear of these, names and monitoring."""
 _TARGET = re.compile(r"#[ \t]*+(\d++|<)?")
 
 
@@ -149,7 +156,30 @@ def _offset_events(given: BlockWords) -> list[tuple[int, int | None, Floats | No
         assigned = note.kind == "assign" and _is_offset(note.text)
         if assigned or (note.kind == "unknown" and note.text.startswith("#")):
             events.append((note.block, None, None))
+    events += [(block, number, None) for block, number in _rewritten(given, "base", _WRITTEN_BASE, base)]
     return sorted(events, key=lambda event: event[0])
+
+
+def _rewritten(
+    given: BlockWords, kind: str, pattern: re.Pattern[str], used: Ints
+) -> Iterator[tuple[int, int | None]]:
+    """Blocks whose notes of a kind write a base or tool that a motion before them has, and its number, None for any:
+    the cell can state only what it is before or after; used (B,): numbers that blocks have; pattern: of
+    notes that count, its group is the number."""
+    notes = [note for note in given.source.notes if note.kind == kind]
+    if not notes:
+        return
+    moving = np.flatnonzero(given.motion)
+    numbers, first = np.unique(used[moving], return_index=True)
+    begins = dict(zip(numbers.tolist(), moving[first].tolist(), strict=True))
+    for note in notes:
+        found = pattern.match(note.text)
+        if found is None:
+            continue
+        number = None if found[1] is None else int(found[1])
+        begin = min(begins.values(), default=len(used)) if number is None else begins.get(number, len(used))
+        if begin < note.block:
+            yield note.block, number
 
 
 def _is_offset(assignment: str) -> bool:
@@ -177,13 +207,27 @@ def tools(given: BlockWords, loaded: int | None = None) -> tuple[Ints, bool]:
     counts = np.append(column.block[1:] != column.block[:-1], True)[: len(column)] & tape[column.block]
     named = np.flatnonzero(counts & ((column.value != 0) | (len(changes) > 0)))
     if not (column.value[named] != 0).any():
-        return everywhere(1 if loaded is None else loaded, n, np.int32), loaded is not None
+        alone = everywhere(1 if loaded is None else loaded, n, np.int32)
+        return _without_rewritten(given, alone), loaded is not None
     block, number = column.block[named], column.value[named]
     whole = (number > 0) & (number == np.floor(number)) & sure[block] & (number < 1e9)
     chosen = fill_modal(n, block, np.where(whole, number, -1).astype(np.int32), first, np.int32)
     if not len(changes):
-        return chosen, True
-    return fill_modal(n, changes, np.where(sure[changes], chosen[changes], -1), first, np.int32), True
+        return _without_rewritten(given, chosen), True
+    changed = fill_modal(n, changes, np.where(sure[changes], chosen[changes], -1), first, np.int32)
+    return _without_rewritten(given, changed), True
+
+
+def _without_rewritten(given: BlockWords, tool: Ints) -> Ints:
+    """(B,) the numbers of tools, -1 from where the program writes other lengths of a tool that it has used."""
+    lost: dict[int | None, int] = {}
+    for block, number in _rewritten(given, "tool data", _WRITTEN_TOOL, tool):
+        lost.setdefault(number, block)
+    if not lost:
+        return tool
+    numbers, which = np.unique(tool, return_inverse=True)
+    until = np.array([min(lost.get(one, len(tool)), lost.get(None, len(tool))) for one in numbers.tolist()])
+    return np.where(np.arange(len(tool)) < until[which], tool, np.int32(-1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -211,7 +211,14 @@ class _Taken:
                     self.note("unknown", rest)
                 return len(text)
             close = assigned_end(text, assigned.end())
-            self.note("base" if name.startswith(b"$P_UIFR") else "assign", text[place:close].strip())
+            kind = (
+                "base"
+                if name.startswith(b"$P_UIFR")
+                else "tool data"
+                if name.startswith(b"$TC_")
+                else "assign"
+            )
+            self.note(kind, text[place:close].strip())
             if name == b"$P_PFRAME":  # what it does is not read, as that of a frame from the machine
                 self.codes(place, close, b"TOFRAME")
             return close

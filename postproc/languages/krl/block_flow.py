@@ -12,7 +12,7 @@ from postproc.languages.krl.flow_frames import BlockFrame
 from postproc.languages.krl.lexing import NAME, SPLINES, Statement, identifiers, kept, value_end
 from postproc.languages.krl.modal_state import ELSEWHERE
 from postproc.languages.krl.open_blocks import BUDGET, OpenBlocks
-from postproc.languages.krl.program_structure import Block
+from postproc.languages.krl.program_blocks import Block
 from postproc.languages.krl.statement_effects import EVERYTHING, MODAL
 from postproc.languages.krl.target import UnknownValue
 

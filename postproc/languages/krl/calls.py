@@ -16,12 +16,14 @@ from postproc.languages.krl.flow_frames import BlockFrame, LabelHead, Restart
 from postproc.languages.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, split_values
 from postproc.languages.krl.modal_state import ELSEWHERE, TRIGGERED, ModalState
 from postproc.languages.krl.other_modules import RoutineExit, take_exit
-from postproc.languages.krl.program_structure import MOST_EFFECTS, Routine, callers, closure
+from postproc.languages.krl.program_blocks import Routine
+from postproc.languages.krl.program_structure import MOST_EFFECTS, callers, closure
 from postproc.languages.krl.statement_effects import (
     EVERYTHING,
     PATH_FROM_FILE,
     SYSTEM,
     Effect,
+    Effects,
     as_effects,
     functions_of,
     is_harmless,
@@ -203,17 +205,30 @@ class Calls(BlockFlow):
         for name, entry in call.saved:
             run.variables.swap(name, entry)
         routine, run.routine, run.spline = run.routine, call.checkpoint.routine, call.checkpoint.spline
-        if flow is None and self.resumes:  # an interrupt may end it
-            self._continue_with(call.before)
-            run.forget(
-                {"point", *routine.effects}, f"after the call in line {self._item(call.back - 1).line}"
-            )
+        ended = flow is not None and call.before is not None and bool(call.before.state.ended_later)
+        if ended or (flow is None and self.resumes):
+            if flow is None:
+                self._continue_with(call.before)
+            back_to = f"after the call in line {self._item(call.back - 1).line}"
+            returned = (name for _, name, _ in call.returned)
+            self._end_anywhere({*routine.effects, *returned}, back_to, call.checkpoint.counts[0])
+            back = []
         for value, name, path in back:
             if value is not None:
                 keep(run, name, path, value)
         if call.lost:
             run.forget(set(call.lost), f"after the call in line {self._item(call.back - 1).line}")
         return call.back
+
+    def _end_anywhere(self, effects: Effects, why: str, first: int = -1) -> None:
+        """After a call that an interrupt may have ended, after any of the rows from ``first`` on."""
+        run = self.run
+        run.forget({"point", *effects}, why)
+        mark = run.rows.new_mark()
+        run.rows.sources[mark] = {*run.state.sources, ELSEWHERE}
+        if first >= 0:
+            run.rows.sources[mark].update(range(first, len(run.rows)))
+        run.state.sources = frozenset([mark])
 
     def _call(self, pc: int, item: Statement, said: Call) -> int:
         run = self.run
@@ -330,6 +345,8 @@ class Calls(BlockFlow):
             if "point" in routine.effects:
                 run.state.sources = run.rows.joined(run.state.sources | {ELSEWHERE})
             run.forget(routine.effects | words, why)
+            if run.state.ended_later:
+                self._end_anywhere(set(), why)
             if self._starts_events(name):
                 run.expect_later(run.survey.later_effects, item.line)
             return
@@ -376,10 +393,15 @@ class Calls(BlockFlow):
         self._after_other(item, said.name, returned)
         if any(isinstance(effect, str) for effect in returned):
             return  # a parameter that is a variable of the controller
+        if run.state.ended_later:
+            why = f"after the call of {shown(said.name)} in line {item.line}"
+            self._end_anywhere(set(), why)
+            return
         left = self._exit_of(said.name, before, tuple(given))
         if left is not None:
             why = f"after the call of {shown(said.name)} in line {item.line}"
             take_exit(run.state, before, left, run.frames, why, item.line)
+            run.state.unsettle(run.has_tcp_mode, run.has_turning)
 
     @abstractmethod
     def _exit_of(self, name: bytes, state: ModalState, given: tuple[Value | None, ...]) -> RoutineExit | None:

@@ -14,7 +14,8 @@ from postproc.languages.krl.lexing import Statement
 from postproc.languages.krl.modal_state import ZERO, FrameRegister, ModalState, Record, joined
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.other_modules import OtherModules
-from postproc.languages.krl.program_structure import Block, ProgramStructure, Routine
+from postproc.languages.krl.program_blocks import Block, Routine
+from postproc.languages.krl.program_structure import ProgramStructure
 from postproc.languages.krl.statement_effects import Effect, Effects
 from postproc.languages.krl.target import UnknownValue, known, shown
 from postproc.languages.krl.variables import VariableFacts, Variables
@@ -48,10 +49,10 @@ class ExecutionContext:
     ``followed``: routines that ran.  ``idle``: what no flow leads to is listed.  ``opaque``: the block, if any, whose
     structure is not understood.  ``spline``: the spline block that is open.  ``has_tcp_mode``, ``has_turning``: some
     line names another interpolation mode, or another way of turning the tool, than the usual one.  ``initial``: what
-    holds where the program starts.  ``root_set``, ``later_since``, ``later_speed``: what ``ModalState`` calls
-    so.  ``others``: the modules that are read besides; ``effects_of_others``: what their routines
-    change of what this one knows; ``unread``: routines that are called and not read; ``depth``:
-    how many calls of other modules lead here.
+    holds where the program starts.  ``root_set``, ``later_since``, ``later_speed``, ``moved_later``,
+    ``ended_later``: what ``ModalState`` calls so.  ``others``: the modules read besides; ``effects_of_others``:
+    what their routines change of what this one knows; ``unread``: routines that are called and not read; ``depth``: how
+    many calls of other modules lead here.
     """
 
     document: Document
@@ -81,6 +82,8 @@ class ExecutionContext:
     root_set: int = 0
     later_since: int = 0
     later_speed: frozenset[Effect] = frozenset()
+    moved_later: int = 0
+    ended_later: int = 0
     unread: set[bytes] = field(default_factory=set)
     depth: int = 0
 
@@ -99,6 +102,13 @@ class ExecutionContext:
             self.later_since = self.later_since or line
         self.later_speed |= effects & {"feed", "apo"}
         self.state.later_speed |= self.later_speed
+        if "point" in effects:
+            self.moved_later = self.moved_later or line
+            self.state.moved_later = self.state.moved_later or line
+            self.state.unsettle(self.has_tcp_mode, self.has_turning)
+        if "resume" in effects:
+            self.ended_later = self.ended_later or line
+            self.state.ended_later = self.state.ended_later or line
 
     def named(self) -> set[bytes]:
         """The names that anything asked for or made unknown: no literal of theirs is changed for one motion alone."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from postproc.languages.core.persistent_map import PersistentMap
 from postproc.languages.krl.execution_context import Flow, SplineBlock
 from postproc.languages.krl.lexing import LOOPS
-from postproc.languages.krl.program_structure import Block, Routine
+from postproc.languages.krl.program_blocks import Block, Routine
 
 
 @dataclass(frozen=True, eq=False)

@@ -108,7 +108,8 @@ class ModalState:
     program has set so that motions do not take them along; no_insert: why nothing can be inserted before the next
     motion, "" where it can; root_set: the line, if any, from which on the program itself states where the robot is in
     the world; later_since: the line, if any, from which on an interrupt or a trigger may change base or tool;
-    later_speed: which of "feed" and "apo" one may change; stop: whether the advance run stops before the next motion,
+    later_speed: which of "feed" and "apo" one may change; moved_later, ended_later: the line, if any, from which on one
+    may move the robot, or end what a call runs (RESUME); stop: whether the advance run stops before the next motion,
     no_advance: before every one: 2 where it does, 1 where it may.
     """
 
@@ -138,6 +139,8 @@ class ModalState:
     later_speed: frozenset[Effect] = frozenset()
     stop: int = 0
     no_advance: int = 0
+    moved_later: int = 0
+    ended_later: int = 0
 
     @property
     def steady_feed(self) -> float:
@@ -159,6 +162,13 @@ class ModalState:
     def lose_point(self, why: str) -> None:
         self.point = self.axes = self.point_frames = self.anchor = None
         self.point_unknown = why
+
+    def unsettle(self, has_tcp_mode: bool, has_turning: bool) -> None:
+        """Where an interrupt or a trigger may have moved the robot nothing is known of where it is."""
+        if self.moved_later:
+            why = f"as the interrupt or trigger of line {self.moved_later} may move the robot at any time"
+            self.forget({"point"}, why, has_tcp_mode, has_turning)
+            self.sources = self.sources | {ELSEWHERE}
 
     def forget(self, words: set[str], why: str, has_tcp_mode: bool, has_turning: bool) -> None:
         """Makes unknown what ``words`` name; the tool is on the flange, and turns evenly, in a program that nowhere
@@ -284,5 +294,7 @@ _JOINS: dict[str, Callable[[Any, Any], object]] = {
     "later_speed": frozenset.union,
     "stop": lambda one, other: 1,
     "no_advance": lambda one, other: 1,
+    "moved_later": _either,
+    "ended_later": _either,
     "point_line": lambda one, other: one,
 }

@@ -135,6 +135,7 @@ def enter_motion(
     if anchor is not None and not _turns_unknown(state, kind, anchor):
         state.anchor, state.point_frames = anchor, (state.base, state.tool)
     state.sources = frozenset([row])
+    state.unsettle(run.has_tcp_mode, run.has_turning)
     return row
 
 

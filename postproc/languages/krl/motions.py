@@ -8,7 +8,7 @@ from postproc.languages.krl.arc_motions import move_on_arc
 from postproc.languages.krl.assignments import with_clause
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.lexing import LONGEST, Statement, identifiers
-from postproc.languages.krl.modal_state import NAN, NOT_TO_TARGET, ModalState
+from postproc.languages.krl.modal_state import ELSEWHERE, NAN, NOT_TO_TARGET, ModalState
 from postproc.languages.krl.motion_entry import enter_motion, extent
 from postproc.languages.krl.motion_refusals import (
     frames_missing,
@@ -71,6 +71,10 @@ def move_bulk(run: ExecutionContext, bulk: VectorisedLines) -> None:
     )
     state.point_line = bulk.line + len(bulk) - 1
     state.sources = frozenset([last])
+    if state.moved_later:
+        for row in range(last + 2 - len(bulk), last + 1):
+            run.rows.sources_of[row] = frozenset([row - 1, ELSEWHERE])
+        state.unsettle(run.has_tcp_mode, run.has_turning)
 
 
 def _bulk_end(state: ModalState, bulk: VectorisedLines) -> Numbers:

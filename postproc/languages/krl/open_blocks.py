@@ -8,7 +8,7 @@ from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.krl.execution_context import ExecutionContext, Flow
 from postproc.languages.krl.flow_frames import Activation, BlockFrame, Checkpoint, Restart, Unfollowed
 from postproc.languages.krl.lexing import LOOPS, Statement
-from postproc.languages.krl.program_structure import Block
+from postproc.languages.krl.program_blocks import Block
 from postproc.toolpath import Annotation
 
 BUDGET = 20_000

@@ -20,7 +20,8 @@ from postproc.languages.krl.lexing import Statement
 from postproc.languages.krl.modal_state import ELSEWHERE, START, FrameIndex, FrameRegister, ModalState
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.predecessors import expanded
-from postproc.languages.krl.program_structure import ProgramStructure, Routine, closure, program_structure
+from postproc.languages.krl.program_blocks import Routine
+from postproc.languages.krl.program_structure import ProgramStructure, closure, program_structure
 from postproc.languages.krl.scan import scan
 from postproc.languages.krl.statement_effects import Effects, is_harmless
 from postproc.languages.krl.target import UnknownValue
@@ -118,6 +119,8 @@ class OtherModules:
         survey.later |= later - own
         for module, _ in self.routines.values():
             module.survey.table_entries |= survey.table_entries
+            for name in module.survey.later & self.effects.keys():
+                module.survey.later_effects |= {one for one in self.effects[name] if isinstance(one, str)}
             module.survey.later |= later - module.declarations.types.keys() | module.shared_later
 
     def directions(self) -> dict[bytes, tuple[bool, ...]]:

@@ -40,7 +40,8 @@ from postproc.languages.krl.other_modules import (
     state_at_entry,
     visible,
 )
-from postproc.languages.krl.program_structure import INLINE, LATER, Routine, closure
+from postproc.languages.krl.program_blocks import Routine
+from postproc.languages.krl.program_structure import INLINE, LATER, closure
 from postproc.languages.krl.statement_effects import EVERYTHING, HIDDEN, effects_of, effects_of_unknown
 from postproc.languages.krl.vectorised import Item, VectorisedLines
 from postproc.toolpath import Annotation
@@ -133,7 +134,8 @@ class ProgramFlow(Calls):
         run.rows.sources[mark].add(ELSEWHERE)
         run.state = ModalState(sources=frozenset([mark]), stop=Stop.MAYBE)
         run.state.root_set, run.state.later_since = run.root_set, run.later_since
-        run.state.later_speed = run.later_speed
+        run.state.later_speed, run.state.ended_later = run.later_speed, run.ended_later
+        run.state.moved_later = run.moved_later
         run.walked = True
         run.forget(EVERYTHING - {"all"}, f"at the start of the subprogram of line {routine.line}")
         run.routine = routine
@@ -141,6 +143,8 @@ class ProgramFlow(Calls):
         first = len(run.rows)
         self._run(routine)
         run.walked_rows.append((first, len(run.rows), routine))
+        if run.ended_later:
+            run.rows.left_from |= set(range(first, len(run.rows)))
         run.walked = False
 
     def _idle(self) -> None:
@@ -311,7 +315,9 @@ class ProgramFlow(Calls):
         run.expect_later(run.survey.later_effects, item.line)
         for name, _ in LATER.findall(item.code):
             name = name.upper()
-            if name + b"(" in item.code.upper().replace(b" ", b"") and name not in run.survey.routines:
+            if name == b"BAS" or name in run.survey.routines:
+                continue
+            if name + b"(" in item.code.upper().replace(b" ", b""):
                 self._unread(item, name)
 
     def _report_letters(self, item: Statement) -> None:

@@ -20,6 +20,7 @@ from postproc.languages.krl.lexing import (
     Statement,
     identifiers,
 )
+from postproc.languages.krl.program_blocks import Block, Routine
 from postproc.languages.krl.statement_effects import (
     HERE,
     MODAL,
@@ -29,6 +30,7 @@ from postproc.languages.krl.statement_effects import (
     Effects,
     declared_external,
     effects_of,
+    effects_of_bas,
     effects_of_unknown,
     entries_given,
     functions_of,
@@ -54,41 +56,6 @@ INLINE = re.compile(rb";[ \t]*FOLD[ \t]+(?:S?(?:PTP|LIN|CIRC)|SPL)(?![A-Za-z0-9_
 _FOLD = re.compile(rb";[ \t]*(END)?FOLD(?![A-Za-z0-9_])", re.I)
 LATER = re.compile(rb"\bDO[ \t]+(" + NAME + rb")(?:[ \t]*+\((.*)\))?", re.I)
 """The routine that runs, or the variable that is assigned, at a time of its own; and what is handed to it."""
-
-
-@dataclass(eq=False)
-class Block:
-    """An IF, SWITCH, loop or spline block: what it may change, and the routines it calls.
-
-    start, end: index of its first and last statement; branches: those of its ELSE, CASE, DEFAULT; broken: its end is
-    missing, or blocks in it are nested too deep; leaves: an EXIT leads out of it; has_labels: a GOTO leads to a
-    label in it; is_entered: one from outside of it.
-    """
-
-    word: bytes
-    line: int
-    start: int
-    end: int = -1
-    branches: list[int] = field(default_factory=list)
-    effects: Effects = field(default_factory=set)
-    calls: set[bytes] = field(default_factory=set)
-    broken: bool = False
-    leaves: bool = False
-    has_labels: bool = False
-    is_entered: bool = False
-
-
-@dataclass(eq=False)
-class Routine(Block):
-    """A DEF or DEFFCT of the file.  types: the variables that it declares and their types, parameters included."""
-
-    name: bytes = b""
-    is_main: bool = False
-    is_global: bool = False
-    is_function: bool = False
-    parameters: tuple[tuple[bytes, bool], ...] = ()
-    types: dict[bytes, bytes] = field(default_factory=dict)
-    labels: dict[bytes, tuple[int, tuple[Block, ...]]] = field(default_factory=dict)
 
 
 @dataclass
@@ -328,9 +295,10 @@ class _Surveyor:
         if statement.word in (b"INTERRUPT", b"TRIGGER", b"GLOBAL"):
             for name, given in LATER.findall(statement.code):
                 call = Call(name.upper(), given)
-                changed = returned_by(call, found.directions)
-                found.later |= {call.name, *(effect for effect in changed if isinstance(effect, bytes))}
-                found.later_effects |= {effect for effect in changed if isinstance(effect, str)}
+                is_bas = call.name == b"BAS"
+                named = effects_of_bas(given) if is_bas else {call.name, *returned_by(call, found.directions)}
+                found.later |= {effect for effect in named if isinstance(effect, bytes)}
+                found.later_effects |= {effect for effect in named if isinstance(effect, str)}
         if stack:
             _join(stack[-1].effects, effects)
             stack[-1].calls.update(functions)

@@ -1,7 +1,8 @@
 """What a statement changes, reads and calls.
 
-An effect is a word ("point", "base", "tool", "feed", "apo", "mode", "turning", "root", "record", "all" for every
-variable that the program assigns) or the name (bytes) of a variable that is assigned.
+An effect is a word ("point", "base", "tool", "feed", "apo", "mode", "turning", "root", "record", "resume" for the end
+of calls that are under way, "all" for every variable that the program assigns) or the name (bytes) of a variable that
+is assigned.
 """
 
 from __future__ import annotations
@@ -120,6 +121,11 @@ def bas(arguments: bytes) -> tuple[bytes, bytes] | None:
     return (found[1].upper(), (found[2] or b"").strip(b" \t")) if found else None
 
 
+def effects_of_bas(arguments: bytes) -> Effects:
+    command = bas(arguments)
+    return set(_BAS_EFFECTS.get(command[0], set()) if command else MODAL)
+
+
 def is_harmless(name: bytes) -> bool:
     """Whether a routine of KUKA's packages is known not to move the robot."""
     return name in HARMLESS or name.startswith(HARMLESS_BEGIN)
@@ -233,8 +239,7 @@ def effects_of(statement: Statement, known: Directions = MappingProxyType({})) -
         return {key.split(b"[")[0] for key, value, _ in said.items if key and value}, b""
     if isinstance(said, Call):
         if said.name == b"BAS":
-            command = bas(said.arguments)
-            return set(_BAS_EFFECTS.get(command[0], set()) if command else MODAL), b""
+            return effects_of_bas(said.arguments), b""
         words: Effects = set() if is_harmless(said.name) else set(returned_by(said, known))
         return words, said.name
     if statement.kind == "open" and statement.word == b"FOR":
@@ -242,4 +247,6 @@ def effects_of(statement: Statement, known: Directions = MappingProxyType({})) -
         return ({counter[1].upper()} if counter else set()), b""
     if statement.kind == "strange":
         return (set(EVERYTHING) if _MORE.search(statement.code) else {"point"}), b""
+    if statement.word == b"RESUME":
+        return {"resume"}, b""
     return ({"point"} if statement.kind == "other" and HIDDEN.search(statement.code) else set()), b""
