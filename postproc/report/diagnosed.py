@@ -260,7 +260,7 @@ class Diagnosed(Result):
         best: dict[str, float] = {}
         for one in self.smallest:
             best[one.candidate.name] = min(one.usual, best.get(one.candidate.name, np.inf))
-        chosen = names_of(self.diagnosis.search.chosen)
+        chosen = {*names_of(self.diagnosis.search.chosen), *(named.effect for named in self.verdict.named)}
         return tuple(name for name, usual in best.items() if usual > USUAL and name not in chosen)
 
     @property
