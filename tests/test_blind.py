@@ -257,6 +257,19 @@ def test_tables_count_every_run(tmp_path):
     assert (tmp_path / "confusion.png").stat().st_size > 10_000
 
 
+def test_intervals_are_counted_by_row_and_kind_of_parameter():
+    inside, outside_, unknown = ([True, held, 1.0, 0.1, 1.0, 1.0] for held in (True, False, None))
+    records = [
+        {"row": "pair", "covered": {"payload.mass": inside, "joint_offset.o2": outside_}},
+        {"row": "single", "covered": {"joint_offset.o3": inside, "joint_offset.o4": unknown}},
+        {"row": "single", "covered": None},
+    ]
+    counted = {line.split(",")[1].split()[0]: line.split()[5:8] for line in table.of_intervals(records)}
+    assert counted["joint_offset"] == ["1", "of", "2"]
+    assert counted["pair"] == ["1", "of", "2"]
+    assert counted["single"] == counted["payload"] == ["1", "of", "1"]
+
+
 def test_what_was_run_is_not_run_again(tmp_path):
     path = tmp_path / "runs.jsonl"
     path.write_text('{"key": "single/0/1", "x": 1}\n{"key": "other/0/2"}\n{"key": "single/1')

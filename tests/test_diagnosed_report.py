@@ -34,10 +34,13 @@ from postproc.measurements import planned
 from postproc.model import StiffnessModel
 from postproc.report import diagnosed_picture as picture_module
 from postproc.report.diagnosed import Diagnosed, NextPoses, diagnosed_csv
+from postproc.report.diagnosed_detection import detection_table
 from postproc.report.diagnosed_limits import evidence_words
+from postproc.report.diagnosed_names import variable_words
 from postproc.report.diagnosed_picture import BARS, betrayals, diagnosed_picture, roles_of, series
 from postproc.report.diagnosed_terminal import show_diagnosed
 from postproc.report.diagnosed_words import NOUNS, headline, noun, paragraph
+from postproc.report.formatting import two_digits
 from postproc.robot.description import Mechanism, Quantity, find_robot, load_robot
 from postproc.robot.provenance import GAP
 
@@ -551,6 +554,42 @@ def test_what_does_not_hold_elsewhere_is_told(spring):
     assert "above the scatter" not in text
 
 
+def test_what_can_be_there_unseen_is_stated(stale, spring):
+    limits = {(one.candidate.label): one for one in stale.detection_limits}
+    one = limits["backlash on A2"]
+    (size,) = one.parameters
+    text = paragraph(stale)
+    assert (
+        f"What is smaller can be there without being seen in {stale.final.campaign.poses} poses: for" in text
+    )
+    table = detection_table(stale, False)
+    rows = list(zip(*(column.cells for column in table.columns), strict=True))
+    (row,) = (cells for cells in rows if cells[0] == "backlash")
+    heads = [str(column.header) for column in table.columns]
+    assert row[heads.index("A2")] == two_digits(size / 1e-3)
+    assert row[-1] == "mrad"
+    entry = next(e for e in stale.as_json()["detection_limits"] if e["label"] == "backlash on A2")
+    assert entry["parameters"] == {"b2": {"smallest": size, "unit": "rad"}}
+    assert entry["displacement_rms_mm"] == pytest.approx(1e3 * one.rms, rel=1e-3)
+    # what is named elsewhere is no limit
+    assert spring.as_json()["detection_limits"] == []
+    assert not detection_table(spring, True).row_count
+    assert "without being seen" not in paragraph(spring)
+
+
+@pytest.mark.parametrize(
+    ("variable", "words"),
+    [
+        ("A2 over its torque", "the torque of A2"),
+        ("A3 over its approach", "the side from which A3 comes"),
+        ("order", "the order of the readings"),
+        ("load", "the load"),
+    ],
+)
+def test_what_a_residual_depends_on_is_a_phrase(variable, words):
+    assert variable_words(variable) == words
+
+
 def test_what_is_said_of_nothing(stale):
     text = paragraph(stale)
     moved_ = len(stale.verdict.refitted)
@@ -639,7 +678,7 @@ def test_what_is_said_of_the_unknown(spring, stale):
         " still be"
         f" {millimetres(result.rms['explained'])}" in text
     )
-    assert f"The residual depends on {result.patterns[0].variable} (" in text
+    assert f"The residual depends on {variable_words(result.patterns[0].variable)} (" in text
     rejected = (
         (stale.diagnosis.search.linear.candidates[0], "its parameters would have to lie at their bounds"),
     )
@@ -687,7 +726,9 @@ def test_what_would_show_what_was_not_tested(stale):
     assert evidence_words("joint_offset", fitted) == "absolute positions"
     assert evidence_words("thermal_growth", fitted).startswith("a column TEMP")
     assert evidence_words("hysteresis", fitted) == "poses reached from both sides"
-    assert "compensate plan" in evidence_words("tool_compliance", fitted)
+    # no pose moves a target on the flange by what the spindle gives
+    assert evidence_words("tool_compliance", fitted).startswith("readings at the tip of the tool")
+    assert "compensate plan" in evidence_words("link_compliance", fitted)
     warm = replace(fitted.campaign.readings, temperature=np.linspace(20, 30, len(fitted.campaign)))
     assert evidence_words("thermal_growth", replace(fitted, campaign=Campaign(warm))) == "absolute positions"
     readings = readings_of(complete(), poses=2, deflection=False)

@@ -11,6 +11,7 @@ from postproc.base.findings import Finding, Refusal
 from postproc.diagnosis.agreement import AGREES, largest_disagreement, without_effects
 from postproc.diagnosis.candidate_fits import with_effects
 from postproc.diagnosis.candidates import Candidate
+from postproc.diagnosis.equivalent_models import cover_equivalent_models
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
 from postproc.diagnosis.sample import sample_of
 from postproc.diagnosis.search import model_unknowns, search
@@ -69,9 +70,9 @@ def diagnose(
                 help="`compensate plan` proposes poses to measure",
             )
         )
-    every, own = np.ones(len(campaign), bool), model_unknowns(model)
+    rows, own = np.ones(len(campaign), bool), model_unknowns(model)
     stage("comparing")
-    stated = fit(campaign, model, (), every)
+    stated = fit(campaign, model, (), rows)
     stage("fitting the model's own parameters")
     sample = sample_of(campaign)
     base = fit(sample, model, own, given=stated.point.given)
@@ -124,10 +125,15 @@ def diagnose(
                 rejected += [(one.candidate, ONLY_TOGETHER) for one in verdict.named]
                 verdict = replace(verdict, word="unknown", named=(), alternatives=())
                 final, disagreement, agreed = base, (), False
-    final = restore_unmoved_geometry(final)
-    verdict = with_estimates(verdict, final, result)
+    every, final = final, restore_unmoved_geometry(final)
     # where an effect is missing in a model its own parameters compensate for that
     moved = refitted(final) if verdict.word not in ("ambiguous", "unknown") else ()
+    final = cover_equivalent_models(final, every, result.base, names)
+    if moved:
+        # that something has moved is clear; which of equivalent parameters it is may not be
+        by_key = {e.unknown.key: e for e in final.estimates}
+        moved = refitted(final) or tuple(by_key[e.unknown.key] for e in moved)
+    verdict = with_estimates(verdict, final, result)
     verdict = replace(verdict, rejected=tuple(rejected), refitted=moved)
     where = residual_patterns(stated, result.confirmed)
     return Diagnosis(stated, where, result, verdict, final, base, disagreement, agreed, clear_is_better)

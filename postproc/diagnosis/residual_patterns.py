@@ -72,7 +72,8 @@ def residual_patterns(
     clear_patterns = []
     tried = list(patterns(fitted, campaign))
     for variable, values, turns, unit in tried:
-        part, parts = _parts(values, max(2, min(BINS, campaign.poses // POSES)))
+        count = len(SIDES) if unit == SIDE else max(2, min(BINS, campaign.poses // POSES))
+        part, parts = _parts(np.sign(values) if unit == SIDE else values, count)
         columns = np.zeros((len(campaign), width, len(parts) if turns is not None else 3 * len(parts)))
         columns[:, :3] = _columns(part, len(parts), turns)
         basis = _clear(outside(explained_by_fit, weights(columns)))

@@ -12,7 +12,7 @@ from postproc.base.arrays import Bools, Floats
 from postproc.base.findings import Finding
 from postproc.diagnosis.candidates import Candidate, names_of
 from postproc.diagnosis.diagnosis import Diagnosis
-from postproc.diagnosis.effect_sizes import Gains, Smallest, gains, moved, smallest
+from postproc.diagnosis.effect_sizes import Gains, Smallest, detection_limits, gains, moved, smallest
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
 from postproc.diagnosis.search_result import Key
 from postproc.diagnosis.selection import explained
@@ -239,22 +239,28 @@ class Diagnosed(Result):
         }
 
     @cached_property
-    def _smallest(self) -> tuple[Smallest, ...]:
+    def smallest(self) -> tuple[Smallest, ...]:
+        """What each candidate that was not found had to be to show."""
         return smallest(self.diagnosis.search)
+
+    @cached_property
+    def detection_limits(self) -> tuple[Smallest, ...]:
+        """The same at the size itself, of the verdict that nothing is missing."""
+        return detection_limits(self.diagnosis.search) if self.verdict.word == "nothing_missing" else ()
 
     @property
     def detectable(self) -> float | None:
         """[m] Root mean square from which on ``NEARLY_ALL`` candidates that were not found would have been found."""
-        shown = sorted(one.rms for one in self._smallest if np.isfinite(one.rms))
+        shown = sorted(one.rms for one in self.smallest if np.isfinite(one.rms))
         return float(np.quantile(shown, NEARLY_ALL)) if shown else None
 
     @property
     def hardly_tested(self) -> tuple[str, ...]:
         """Effects that would have to be ``USUAL`` times as large as usual to show, on whatever joint."""
         best: dict[str, float] = {}
-        for one in self._smallest:
+        for one in self.smallest:
             best[one.candidate.name] = min(one.usual, best.get(one.candidate.name, np.inf))
-        chosen = names_of(self.diagnosis.search.chosen)
+        chosen = {*names_of(self.diagnosis.search.chosen), *(named.effect for named in self.verdict.named)}
         return tuple(name for name, usual in best.items() if usual > USUAL and name not in chosen)
 
     @property
@@ -310,6 +316,7 @@ class Diagnosed(Result):
             "not_testable": list(verdict.not_testable),
             "hardly_testable": list(self.hardly_tested),
             "detectable_rms_mm": None if self.detectable is None else mm(self.detectable),
+            "detection_limits": [_limit(one) for one in self.detection_limits],
             "refitted": [_refitted(estimate) for estimate in verdict.refitted],
             "residual_patterns": [_where(one) for one in self.diagnosis.where],
             "residual_patterns_refitted": [_where(one) for one in self.patterns],
@@ -382,6 +389,16 @@ def _candidate(candidate: Candidate) -> dict[str, object]:
         "options": candidate.effect.described(),
         "label": candidate.label,
     }
+
+
+def _limit(one: Smallest) -> dict[str, object]:
+    """What would have been found from these sizes on; null where no size shows."""
+    sizes = {
+        u.parameter.name: {"smallest": _finite(size), "unit": u.parameter.unit}
+        for u, size in zip(one.candidate.shown, one.parameters, strict=True)
+    }
+    rms = mm(one.rms) if np.isfinite(one.rms) else None
+    return {**_candidate(one.candidate), "displacement_rms_mm": rms, "parameters": sizes}
 
 
 def _parameter(estimate: Estimate) -> dict[str, object]:

@@ -43,6 +43,8 @@ def evidence_words(name: str, fitted: Fit) -> str:
         return "absolute positions"
     if name == "tool_offset" and not campaign.place_known.all():
         return "targets with stated positions"
+    if name == "tool_compliance" and not campaign.at_tip:
+        return "readings at the tip of the tool: targets on the flange do not move with the spindle"
     if effect.family == "weight" and not any(isinstance(t.effect, ComplianceLaw) for t in fitted.model.terms):
         return "a robot file with joint compliance"
     if effect.family in LOADED and not readings.wrench.any():

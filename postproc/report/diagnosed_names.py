@@ -37,3 +37,11 @@ def in_words(candidate: Candidate) -> str:
     last = candidate.up_to_joint
     joints = candidate.joint or (f"the joints up to {last}" if last else "the joints")
     return f"{NOUNS[candidate.name].split(':')[0].format(joints=joints)} ({candidate.label})"
+
+
+def variable_words(name: str) -> str:
+    """What a residual depends on: ``the torque of A2`` of ``A2 over its torque``."""
+    joint, over, quantity = name.partition(" over its ")
+    if not over:
+        return "the order of the readings" if name == "order" else f"the {name}"
+    return f"the side from which {joint} comes" if quantity == "approach" else f"the {quantity} of {joint}"

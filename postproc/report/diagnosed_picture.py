@@ -105,7 +105,7 @@ def _handles(axes: Axes) -> list[Any]:
 def series(result: Diagnosed) -> list[str]:
     """The residuals that are drawn: each fit once."""
     same = {"refitted": result.diagnosis.base, "explained": result.diagnosis.search.confirmed}
-    return [name for name in _NAMES if same.get(name) is not result.final]
+    return [name for name in _NAMES if (one := same.get(name)) is None or one.point is not result.final.point]
 
 
 def _gap(axes: Axes, result: Diagnosed) -> None:

@@ -12,6 +12,7 @@ from rich.text import Text
 from postproc.base.sanitize import sanitize
 from postproc.base.units import MM
 from postproc.report.diagnosed import Diagnosed
+from postproc.report.diagnosed_detection import detection_table
 from postproc.report.diagnosed_words import headline, paragraph
 from postproc.report.formatting import campaign_in_words, count, fixed, shown_unit, some
 from postproc.report.identified_terminal import add_sizes
@@ -39,6 +40,7 @@ def show_diagnosed(console: Console, result: Diagnosed, verbose: bool = False) -
         refitted_table,
         places_table,
         residual_table,
+        detection_table,
         next_poses_table,
     )
     for make in tables:

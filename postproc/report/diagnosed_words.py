@@ -12,8 +12,9 @@ from postproc.diagnosis.residual_patterns import goes_with_poses
 from postproc.diagnosis.verdict import MARGIN, Named
 from postproc.identification.fit import Estimate
 from postproc.report.diagnosed import Diagnosed
+from postproc.report.diagnosed_detection import sentences as detection_limits
 from postproc.report.diagnosed_limits import conditional, not_tested
-from postproc.report.diagnosed_names import NOUNS, in_words
+from postproc.report.diagnosed_names import NOUNS, in_words, variable_words
 from postproc.report.formatting import count, fixed, listed, shown_unit
 from postproc.report.formatting import millimetres as _mm
 from postproc.report.terminal import short_names
@@ -97,6 +98,7 @@ def _nothing_missing(result: Diagnosed) -> Iterator[str]:
             f"A missing effect of about {_mm(result.detectable)} mm RMS or more would have been found, unless"
             " parameters of the robot file imitate it."
         )
+    yield from detection_limits(result)
 
 
 def _named(result: Diagnosed) -> Iterator[str]:
@@ -203,8 +205,8 @@ def _unknown(result: Diagnosed) -> Iterator[str]:
     if result.patterns:
         first = result.patterns[0]
         yield (
-            f"The residual depends on {first.variable} ({100 * first.share:.0f} % of its squares; {first.pattern}):"
-            " check robot and measurement there."
+            f"The residual depends on {variable_words(first.variable)} ({100 * first.share:.0f} % of its squares;"
+            f" {first.pattern}): check robot and measurement there."
         )
     yield from _moved_too(result)
 
@@ -386,7 +388,7 @@ def _more(result: Diagnosed, start: str, fit: str) -> Iterator[str]:
         )
         if result.verdict.remainder:
             first = result.verdict.remainder[0]
-            yield f"It depends on {first.variable} ({first.pattern})."
+            yield f"It depends on {variable_words(first.variable)} ({first.pattern})."
     yield from _rejected(result)
 
 

@@ -9,6 +9,7 @@ from rich.table import Table
 from postproc.base.units import MM
 from postproc.report import diagnosed_terminal, identified_terminal
 from postproc.report.diagnosed import Diagnosed
+from postproc.report.diagnosed_detection import detection_table
 from postproc.report.diagnosed_picture import diagnosed_picture
 from postproc.report.diagnosed_words import headline, paragraph
 from postproc.report.identified import Identified
@@ -49,6 +50,7 @@ def diagnosed_page(result: Diagnosed, links: Mapping[str, str]) -> bytes:
         terminal.refitted_table,
         terminal.places_table,
         terminal.residual_table,
+        detection_table,
         terminal.next_poses_table,
     )
     return ResultPage(

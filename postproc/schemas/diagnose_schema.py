@@ -121,6 +121,30 @@ def diagnose_schema() -> Schema:
             "detectable_rms_mm": quantity(
                 "mm", "displacement from which on most effects are detected", nullable=True
             ),
+            "detection_limits": array(
+                record(
+                    {
+                        **_CANDIDATE,
+                        "displacement_rms_mm": quantity(
+                            "mm", "displacement of the parameter that shows least, RMS", nullable=True
+                        ),
+                        "parameters": by_name(
+                            record(
+                                {
+                                    "smallest": quantity(
+                                        "as in unit", "size found with 95 % probability", nullable=True
+                                    ),
+                                    "unit": word("SI unit"),
+                                },
+                                "one parameter, the others at their null",
+                            ),
+                            "each parameter; null where no size shows",
+                        ),
+                    },
+                    "one candidate",
+                ),
+                "where nothing is missing: sizes below which candidates can be there without being seen",
+            ),
             "refitted": array(refitted, "parameters of the robot file that have changed"),
             "residual_patterns": _patterns("patterns in the residuals of the robot file"),
             "residual_patterns_refitted": _patterns("the same, its own parameters refitted"),

@@ -155,6 +155,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     seeds = ", ".join(sorted({record["key"].split("/")[2] for record in records}))
     print(f"seed {seeds}, {len(records)} runs; {done} of them now, {spent / max(1, done):.1f} s each\n")
     print("\n".join(table.matrix(records)) + "\n")
+    print("\n".join(sorted(table.of_intervals(records))) + "\n")
     print("\n".join(table.per_effect(records)) + "\n")
     print("\n".join(table.confusion_text(records)) + "\n")
     print("\n".join(table.wrong_cases(records, given.wrong)))

@@ -131,6 +131,19 @@ def matrix(records: Records) -> list[str]:
     return told
 
 
+def of_intervals(records: Records) -> list[str]:
+    """How often intervals hold the true values, by row and by kind of parameter."""
+    held: dict[str, list[dict]] = {}
+    for record in records:
+        for name, (_, inside, *_) in (record["covered"] or {}).items():
+            if inside is not None:
+                for kind in (record["row"], name.partition(".")[0].partition(" ")[0]):
+                    held.setdefault(kind, []).append({"it": inside})
+    return [
+        f"true values in intervals, {kind:20} {share(of, lambda h: h['it'])}" for kind, of in held.items()
+    ]
+
+
 def inseparable(record: dict) -> bool:
     return any(of and of[0][2] < 10.0 for of in record["rivals"])
 

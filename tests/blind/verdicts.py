@@ -147,12 +147,12 @@ def right(row: str, outcome: str) -> bool:
     return outcome in ("exact", "ambiguous", "unseen")
 
 
-def covered(run: Run, found: StiffnessModel) -> dict[str, list[bool | None]]:
+def covered(run: Run, found: StiffnessModel) -> dict[str, list]:
     """Whether the 95 % intervals of the robot file that was written hold the values that its parameters take where the
     readings have no scatter; and the true values themselves (None of what has none).
 
     The two differ by what stays as the robot file before stated it: a zero of the last joint that no reading tells from
-    a turn of the tool is in that turn.
+    a turn of the tool is in that turn.  After these two: value, interval, and what the two are held against (SI).
     """
     told = {
         (term, name): value
@@ -167,7 +167,6 @@ def covered(run: Run, found: StiffnessModel) -> dict[str, list[bool | None]]:
     true, holds = run.true(), {}
     for (term, name), value in told.items():
         there = [fitted.model.terms[term].values[name], true.get(f"{found.terms[term].effect.name}.{name}")]
-        holds[f"{found.label(term)}.{name}"] = [
-            None if one is None else bool(abs(value.value - one) <= value.interval) for one in there
-        ]
+        inside = [None if one is None else bool(abs(value.value - one) <= value.interval) for one in there]
+        holds[f"{found.label(term)}.{name}"] = [*inside, value.value, value.interval, *there]
     return holds
