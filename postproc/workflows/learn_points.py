@@ -36,6 +36,7 @@ from postproc.process.stock.cutters import Cutter
 from postproc.process.stock.stock_section import has_stock, read_stock_process
 from postproc.verification.pairing import Pairing
 from postproc.workflows.cell_force_factors import operations_of
+from postproc.workflows.cell_tool_errors import tool_numbers
 from postproc.workflows.learn_commands import commands_at, cutting_program
 from postproc.workflows.preparation import Prepared, Request, prepare
 
@@ -106,7 +107,7 @@ def read_job(request: Request) -> CutProgram:
             Finding("LRN011", message, program, help="state the forces, as the main job needs them")
         )
     frames = frames_of(cell, path, program)
-    numbers = np.array([frame.number or 0 for frame in path.frames] + [0])[path.tool]
+    numbers = tool_numbers(path)
     cutters, findings = _cutters(ready, numbers[task.carries], program)
     known = {cutter.number: index for index, cutter in enumerate(cutters)}
     desired = task.desired_path
@@ -209,7 +210,8 @@ def match(
     cause_list = robot_causes(job.ready.model)
     cause_list += force_causes(operation, job.operations.names, known)
     spring = all(part.spring_pass for part in parts)
-    cause_list += tool_causes(points, job.tool[points.row], job.ball, spring)
+    stated = job.ready.cell.tool_errors
+    cause_list += tool_causes(points, job.tool[points.row], job.ball, spring, stated)
     constrained = [one for one in range(6) if fixed[:, one].any()]
     cause_list += base_causes(rigid * fixed, constrained)
     layout = Layout(
