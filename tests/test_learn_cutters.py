@@ -8,7 +8,8 @@ from postproc.workflows.learn_points import read_job
 from postproc.workflows.preparation import Request
 
 BALL = ";T1  D=16. CR=8. - ZMIN=-12. - ball end mill"
-STOCK = "stock: {box: [[0, 0, -30], [500, 400, 0]]}\ndefaults: {teeth: 3, helix: 30, spindle: 12000, material: EN AW-7075-T6}\n"
+STOCK = "stock: {box: [[0, 0, -30], [500, 400, 0]]}\n"
+STOCK += "defaults: {teeth: 3, helix: 30, spindle: 12000, material: EN AW-7075-T6}\n"
 
 
 def shop(folder, *comments: str, diameter: str = "", process: str = ""):
