@@ -145,7 +145,7 @@ CODES = define(
         "LRN018": Code(
             "info",
             "tool or base differs from what is programmed",
-            meaning="The interval of its radius, length or place excludes what control, program and cell state.",
+            meaning="Its radius, length or place is not what control, program and cell state, probably or surely.",
             consequence="The next program corrects it; other programs do so only if the cell states it.",
             action="Check it: set it in the control, or add the lines of the learnt file to the cell, never both.",
             example="A cutter that was ground is 0.03 mm smaller.",

@@ -83,23 +83,27 @@ def tool_error_lines(
 
 
 def tool_and_base_findings(result: Attribution, file: str, lines: str) -> list[Finding]:
-    """Tools and bases whose interval excludes what is programmed; ``lines``: file of the lines for the cell."""
+    """Tools and bases that differ from what is programmed by more than a standard deviation: probably, or surely where
+    the interval excludes none; ``lines``: file of the lines for the cell."""
     findings = []
     for cause, value, deviation in _measured(result, "tool"):
         total, width = (cause.value + value) / MM, COVERAGE * deviation / MM
-        if abs(total) <= width:
+        if abs(total) * MM <= deviation or not is_observed(cause, value, deviation):
             continue
         more = {"radius": ("larger", "smaller"), "length": ("longer", "shorter")}[cause.parameter][total < 0]
-        message = f"{cause.place} is {more} than programmed by {abs(total):.3f} +- {width:.3f} mm ({cause.parameter})"
+        word = "is" if abs(total) > width else "is probably"
+        message = f"{cause.place} {word} {more} than programmed by {abs(total):.3f} +- {width:.3f} mm"
+        message += f" ({cause.parameter})"
         help = f"measure it and set it in control and CAM, or add the lines of {lines} to the cell; not both"
         findings.append(Finding("LRN018", message, file, help=help))
     for cause, value, deviation in _measured(result, "base"):
-        if abs(value) <= COVERAGE * deviation:
+        if abs(value) <= deviation or not is_observed(cause, value, deviation):
             continue
         turn = cause.unit == "rad"
         unit, name = (DEG, "deg") if turn else (MM, "mm")
         axis, digits = _BASE_AXES[cause.parameter], 4 if turn else 3
-        message = f"the part was cut {'turned about' if turn else 'shifted along'} {axis} of its base by"
+        word = "was" if abs(value) > COVERAGE * deviation else "was probably"
+        message = f"the part {word} cut {'turned about' if turn else 'shifted along'} {axis} of its base by"
         message += f" {value / unit:+.{digits}f} +- {COVERAGE * deviation / unit:.{digits}f} {name}"
         help = "touch the base off again; the next program corrects it at this place, no other program does"
         findings.append(Finding("LRN018", message, file, help=help))

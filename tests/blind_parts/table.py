@@ -77,7 +77,8 @@ def _place(answers: Sequence[dict[str, Any]]) -> list[str]:
     return [
         "",
         f"another place, robot file, force factors and tool errors only: {median_interval(removed)} % removed,"
-        f" 5th percentile {median_interval(removed, 0.05)}, worse {share_interval(worse, len(done))} % ({len(done)} draws)",
+        f" 5th percentile {median_interval(removed, 0.05)}, worse {share_interval(worse, len(done))} %"
+        f" ({len(done)} draws)",
     ]
 
 
