@@ -123,6 +123,38 @@ def test_the_factors_of_the_cell_are_those_of_the_next_program(learned):
     assert max(ratio) == pytest.approx(max(f.factor for n, f in factors.items() if n != "others"), rel=1e-2)
 
 
+def test_all_that_was_learnt_gives_the_next_program_again(learned):
+    """Robot file, force factors and tool errors, in a cell beside the program."""
+    folder, _ = learned
+    lines = [
+        (folder / "learned" / f"part.{name}.yaml").read_text() for name in ("force_factors", "tool_errors")
+    ]
+    cell = folder / "all.yaml"
+    cell.write_text((folder / "cell.yaml").read_text() + "".join(lines))
+    assert load_cell(cell).tool_errors[1].radius == pytest.approx(3e-6, abs=2e-6)
+    robot = str(folder / "learned" / "kuka_kr270_learned.yaml")
+    program = folder / "again" / "part.src"
+    postproc.compensate(folder / "part.src", force=True, cell=cell, robot=robot, output=program)
+    one, other = (
+        prepare(Request(path, cell=cell)).task.toolpath.position
+        for path in (program, folder / "learned" / "part.src")
+    )
+    np.testing.assert_allclose(one, other, atol=1.1e-6, equal_nan=True)
+
+
+def test_a_larger_tool_is_said(shop):
+    """0.05 mm less material at every wall than the sample has: the tool is larger, to be checked or set."""
+
+    def deeper(row):
+        wall = float(row[5]) < 0.5
+        return [*row[:6], f"{float(row[6]) - 0.05 * wall:.4f}", *row[7:]]
+
+    changed(shop, lambda lines: with_rows(lines, lambda rows: map(deeper, rows)))
+    done = call(shop, "part.src", "part1.csv", "--dry-run", "--json", "r.json", "-v")
+    assert "LRN018 tool 1 is probably larger than programmed by 0.0" in done.output
+    assert "part.tool_errors.yaml to the cell; not both" in done.output
+
+
 def test_a_run_is_its_own_repetition(learned, shop):
     call(shop, "part.src", "part1.csv", "-q")
     for name in ("part.src", "part.force_factors.yaml"):

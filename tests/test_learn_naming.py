@@ -131,3 +131,24 @@ def test_a_force_in_corners_is_named_and_corrected(tmp_path):
     )
     after = cut(surface, truth, plant, program.parent / "learned" / "part.src", rng)
     assert aligned_rms(surface, after) < 0.35 * aligned_rms(surface, before)
+
+
+@pytest.mark.slow
+def test_a_worn_gear_shows_in_the_few_points_after_a_reversal(tmp_path):
+    """A loop of 0.22 mrad of A1: the axis lies on one side of it but for some points, where a new gear, of a narrow
+    loop, would lie on the other side already."""
+    program = write_shop(tmp_path / "shop")
+    postproc.compensate(program, force=True)
+    rng = np.random.default_rng([9005, 953544162])
+    surface = surface_of(program.parent, *surface_points(140, rng))
+    operations = [name for name in surface.program.operations.names if name != "tool 1"]
+    truth = draw_truth(rng, operations, ("hysteresis",), worn=4.0)
+    assert truth.names() == {"hysteresis of A1": pytest.approx(2.2e-4, rel=0.01)}
+    chosen = rng.choice(140, 120, replace=False)
+    first = program.parent / "compensated" / "part.src"
+    errors = cut(surface, truth, truth.plant(), first, rng)
+    deviation = probe(surface, errors, chosen, 1e-5, rng)
+    write_csv(program.parent / "m.csv", surface, chosen, deviation, first, 1e-5)
+    learned = postproc.learn(program, program.parent / "m.csv", dry_run=True).attribution
+    names = [one.name for one in learned.named] or list(learned.alternatives)
+    assert "hysteresis of A1" in names

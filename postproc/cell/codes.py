@@ -34,6 +34,14 @@ CODES = define(
             action="State it: controller: {absolute_accuracy: true} or false.",
             example="`correct: absolute` without `controller:`.",
         ),
+        "CEL013": Code(
+            "warning",
+            "side of a wall is not stated",
+            meaning="tool_errors states the radius of a tool, and not on which side of the feed its walls lie.",
+            consequence="The larger or smaller radius is not corrected in the operations that the message names.",
+            action="Add walls: {OPERATION: left} or right to the tool, seen along the spindle.",
+            example="A cell that was learnt from one program, used for another with other operations.",
+        ),
         "CEL005": Code(
             "warning",
             "implausible number in the cell",

@@ -11,6 +11,7 @@ from postproc.base.findings import Finding
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
 from postproc.cell.stated_room import StatedRoom
+from postproc.cell.tool_errors import ToolError
 from postproc.robot.external_axes import ExternalAxis
 from postproc.toolpath.initial_state import UNSTATED, InitialState, Symbol
 
@@ -66,10 +67,6 @@ class ForceFactor:
     turn: tuple[float, float] = (0.0, 0.0)
 
 
-OTHERS = "others"
-"""Key of the factor of all operations that have none of their own."""
-
-
 @dataclass(frozen=True, eq=False)
 class Cell:
     """One checked cell file.
@@ -81,7 +78,8 @@ class Cell:
     interval of all forces, as a share of them; None where nothing is stated.  ``dialect``: name of the programs'
     language, where their names and contents do not identify it; ``config_dat``: the controller's $config.dat, relative
     to the cell file.  ``force_vector``: intervals of the forces besides their scale; ``force_factors``: operation ->
-    what was learnt of its force; ``force_ramp`` [m]: the path over
+    what was learnt of its force; ``tool_errors``: number of a tool -> how it differs from what is programmed;
+    ``force_ramp`` [m]: the path over
     which a force changes, None where it is not stated.  ``correct``: one of ``MODES``; ``touch_points``: number of a
     base -> (K, 3) [m] places in it at which it was touched off, None for the one base that a program uses;
     ``touch_line`` is where they are.  ``temperature`` [degC] of the robot.
@@ -118,6 +116,8 @@ class Cell:
     force_vector: ForceVectorInterval | None = None
     force_ramp: float | None = None
     force_factors: Mapping[str, ForceFactor] = field(default_factory=dict)
+    tool_errors: Mapping[int, ToolError] = field(default_factory=dict)
+    tool_errors_line: int = 0
     touch_points: dict[int | None, Floats] = field(default_factory=dict)
     touch_line: int = 0
     temperature: float | None = None

@@ -18,9 +18,10 @@ from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
 from postproc.base.yaml_section import YamlSection, load
 from postproc.cell.controller_state import read_program_start, read_symbols
-from postproc.cell.description import MODES, OTHERS, Cell, Controller, ForceFactor, ForceVectorInterval, Tool
+from postproc.cell.description import MODES, Cell, Controller, ForceFactor, ForceVectorInterval, Tool
 from postproc.cell.implausible import implausible
 from postproc.cell.stated_room import read_room
+from postproc.cell.tool_errors import OTHERS, read_tool_error
 from postproc.robot.read_external_axes import read_external
 
 NAME = "cell.yaml"
@@ -39,6 +40,7 @@ KEYS = (
     "force_ci95",
     "force_ramp",
     "force_factors",
+    "tool_errors",
     "process",
     "correct",
     "touch_points",
@@ -136,6 +138,8 @@ def load_cell(path: Path) -> Cell:
         config_dat=_word(dialect, "config_dat") if "config_dat" in dialect else None,
         force_vector=vector,
         force_factors=_force_factors(top),
+        tool_errors={number: read_tool_error(section) for number, section in _numbered(top, "tool_errors")},
+        tool_errors_line=top.line_of("tool_errors") if "tool_errors" in top else 0,
         force_ramp=top.number("force_ramp", low=0.0, unit="mm") * MM if "force_ramp" in top else None,
         touch_points=_touch_points(top, correct),
         touch_line=top.line_of("touch_points") if "touch_points" in top else 0,

@@ -19,7 +19,7 @@ from postproc.cli.decimal_option import Decimal
     "--output",
     type=click.Path(path_type=Path, file_okay=False),
     metavar="FOLDER",
-    help="Folder of the next program, the new robot file and the force factors [learned/ beside PROGRAM].",
+    help="Folder of the next program, the new robot file, force factors and tool errors [learned/ beside PROGRAM].",
 )
 @click.option(
     "--gain",

@@ -16,6 +16,7 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.learning.candidates import Circumstances, MissingEffect, candidates
 from postproc.learning.causes import Cause, CausePrediction
+from postproc.learning.considered import considered_covariance
 from postproc.learning.covariance import Explanation, Layout, SmoothField, choose_surface, without_field
 from postproc.learning.excluded_points import MOST_OUTLIERS, OUTLIERS_EACH, find_outliers
 from postproc.learning.naming import NAMED, probable_set, weigh_effects
@@ -181,6 +182,10 @@ def attribute(
         prediction, x, kept, explained = trial.prediction, trial.x, trial.kept, trial.explained
     verdict = _verdict(bool(alternatives), bool(named), explained)
     mean, covariance = explained.causes()
+    if search:
+        noise = float(np.median(layout.sigma[kept]))
+        offered = candidates(prediction, x, around, noise, [one.name for one in joined])
+        covariance = covariance + considered_covariance(explained, offered, np.flatnonzero(kept))
     root = prediction.before[1]
     standardised = np.full(len(deviation), np.nan)
     standardised[kept] = explained.standardised()
@@ -212,7 +217,7 @@ def _with_effect(
 ) -> _Hypothesis | None:
     """The causes with those of an effect beside them; None where they cannot be found, or are as good as null.  A gap
     acts otherwise near its null than at its size: the likelier of two starts counts."""
-    trial, found = prediction.with_causes(effect.causes, effect.model), []
+    trial, found = prediction.with_causes(effect.causes, effect.model, effect.wide), []
     for start in (0.0, 1.0):
         sizes = [start * cause.deviation for cause in effect.causes]
         try:
@@ -233,7 +238,7 @@ def _instead_of_first(
     may look likelier that is not so at its true size."""
     noise = float(np.median(layout.sigma[bare.kept]))
     offered = candidates(bare.prediction, bare.x, around, noise)
-    own = next((one for one in offered if one.name == second.name), None)
+    own = next((one for one in offered if (one.name, one.wide) == (second.name, second.wide)), None)
     if own is None:
         return None
     factor = second.causes[0].deviation / own.causes[0].deviation

@@ -27,6 +27,9 @@ CORNER, ENGAGEMENT, DRIFT = 0.3, 1.5, 0.05 * MM
 FACTORS = (0.5, 1.0, 2.0, 4.0)
 """Sizes that are tried, in standard deviations."""
 
+_OTHER_SIDE = 0.1
+"""Share of a gap by which an axis must lie otherwise in a wide one for that to be tried too."""
+
 _SEEN = 0.3
 """An effect that nowhere does as much as this share of the noise is not looked for."""
 
@@ -34,13 +37,19 @@ _SEEN = 0.3
 @dataclass(frozen=True, eq=False)
 class MissingEffect:
     """``name``; ``causes``: those that it adds; ``model``: with its effect; ``columns`` (K, Q) [m per standard
-    deviation]; ``transfers``: it holds at another place too."""
+    deviation]; ``transfers``: it holds at another place too; ``wide``: with the sides of axes in wide gaps."""
 
     name: str
     causes: tuple[Cause, ...]
     model: StiffnessModel
     columns: Floats
     transfers: bool
+    wide: bool = False
+
+    @property
+    def family(self) -> str:
+        """The effect without its joint."""
+        return self.name.split(" ")[0]
 
     def widened(self, factor: float) -> MissingEffect:
         """With ``factor`` times the standard deviations of its causes, and the same columns."""
@@ -64,8 +73,7 @@ def candidates(
     ``x`` (P,); ``noise`` [m]: of a point."""
     found = []
     for name, size in SIZES.items():
-        for candidate in _of_effect(prediction, x, name, size):
-            found.append(candidate)
+        found += _of_effect(prediction, x, name, size)
     found += _of_process(prediction, x, around)
     return [
         candidate
@@ -104,14 +112,24 @@ def _of_effect(prediction: CausePrediction, x: Floats, name: str, size: float) -
         )
     found = []
     for label, causes in groups.items():
-        alone = CausePrediction(prediction.points, extended, (*prediction.causes, *causes))
-        columns = _own_columns(alone, np.append(x, np.zeros(len(causes))), len(causes))
-        found.append(
-            MissingEffect(
-                label, tuple(causes), extended, columns * [c.deviation for c in causes], transfers=True
-            )
-        )
+        start, sizes = np.append(x, np.zeros(len(causes))), [cause.deviation for cause in causes]
+        narrow = prediction.with_causes(causes, extended)
+        columns = _own_columns(narrow, start, len(causes)) * sizes
+        found.append(MissingEffect(label, tuple(causes), extended, columns, transfers=True))
+        if not effect.by_direction:
+            continue
+        joint = _joint_number(prediction, causes[0])
+        sides = prediction.points.wide_direction[:, joint] - prediction.points.direction[:, joint]
+        if np.abs(sides).max(initial=0.0) > _OTHER_SIDE:
+            wide = prediction.with_causes(causes, extended, wide=True)
+            columns = _own_columns(wide, start, len(causes)) * sizes
+            found.append(MissingEffect(label, tuple(causes), extended, columns, transfers=True, wide=True))
     return found
+
+
+def _joint_number(prediction: CausePrediction, cause: Cause) -> int:
+    names = [joint.name for joint in prediction.model.robot.joints]
+    return names.index(cause.place.split(" ")[-1])
 
 
 def _own_columns(prediction: CausePrediction, x: Floats, count: int) -> Floats:

@@ -6,14 +6,16 @@ the force in rad; dimensions in m.  Every cause has the mean 0 and a standard de
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
+from postproc.cell.tool_errors import ToolError
 from postproc.effects.gravity_compensator import GravityCompensator
 from postproc.learning.touched_points import TouchedPoints
 from postproc.model import StiffnessModel
@@ -33,6 +35,9 @@ FORCE_TURN = 0.1
 
 RADIUS, LENGTH = 0.02e-3, 0.05e-3
 """[m] of a tool that was measured in a tool setter."""
+
+LEAST_CI95 = 1e-6
+"""[m] A tool is not known better."""
 
 BASE_SHIFT, BASE_TURN = 0.1e-3, 0.1e-3
 """[m], [rad] of a base that was touched off."""
@@ -58,7 +63,8 @@ class CauseKind(Enum):
 @dataclass(frozen=True, eq=False)
 class Cause:
     """``name``; ``group``: robot, force, tool, base or effect; ``deviation``: before the measurement; ``unit``: "1" for
-    a share.  ``term``, ``parameter`` and ``value``: of the model.  ``weight`` (K,): how much of it acts at each point,
+    a share.  ``term``, ``parameter`` and ``value``: of the model; ``value`` of a tool: what the cell states already, to
+    which the cause adds.  ``weight`` (K,): how much of it acts at each point,
     of SHIFT the whole column [m].  ``place``: operation or tool that it belongs to;
     ``positive``: it has no negative values."""
 
@@ -117,9 +123,12 @@ class CausePrediction:
         causes = tuple(cause.part(rows) for cause in self.causes)
         return CausePrediction(self.points.part(rows), self.model, causes, self.mean, self.root)
 
-    def with_causes(self, more: Sequence[Cause], model: StiffnessModel | None = None) -> CausePrediction:
-        """With further causes, of effects of another model."""
-        return CausePrediction(self.points, model or self.model, (*self.causes, *more), self.mean, self.root)
+    def with_causes(
+        self, more: Sequence[Cause], model: StiffnessModel | None = None, wide: bool = False
+    ) -> CausePrediction:
+        """With further causes, of effects of another model; ``wide``: with the sides of wide gaps."""
+        points = self.points.with_wide_gaps() if wide else self.points
+        return CausePrediction(points, model or self.model, (*self.causes, *more), self.mean, self.root)
 
     def model_at(self, x: Floats) -> StiffnessModel:
         """The model with the values of the causes ``x`` (P,)."""
@@ -160,7 +169,7 @@ class CausePrediction:
         errors = self.points.errors(self.model_at(x), scale, turn, self._sides)
         for cause, one in zip(self.causes, x.tolist(), strict=True):
             if cause.kind is CauseKind.SHIFT:
-                errors = errors + one * cause.weight
+                errors = errors + (cause.value + one) * cause.weight
         return errors
 
     def columns(self, x: Floats) -> Floats:
@@ -252,8 +261,15 @@ def force_causes(which: Ints, names: Sequence[str], known: PriorKnowledge) -> li
     return causes
 
 
-def tool_causes(points: TouchedPoints, number: Ints, ball: Sequence[int], spring: bool) -> list[Cause]:
-    """Radius and length of the tools ``number`` (K,); ``ball``: numbers of those with a ball.
+def tool_causes(
+    points: TouchedPoints,
+    number: Ints,
+    ball: Sequence[int],
+    spring: bool,
+    stated: Mapping[int, ToolError] = MappingProxyType({}),
+) -> list[Cause]:
+    """Radius and length of the tools ``number`` (K,); ``ball``: numbers of those with a ball; ``stated``: what the cell
+    states of them already.
 
     A larger radius moves the surface of the cutter by dr |n across the spindle|, of a ball with its tip in place by
     dr (1 + n . a), a longer tool by dl (n . a), with a the spindle, tip-ward; where it cuts deeper less is left.
@@ -262,37 +278,17 @@ def tool_causes(points: TouchedPoints, number: Ints, ball: Sequence[int], spring
     along = np.sum(points.normal * points.spindle, axis=1)
     across = np.sqrt(np.maximum(1.0 - along**2, 0.0))
     for tool in np.unique(number).tolist():
-        own = (number == tool).astype(float)
+        own, known = (number == tool).astype(float), stated.get(tool, ToolError())
         radial = own * ((1.0 + along) if tool in ball else across)
-        if np.abs(radial).max() > 0.05:
-            deviation = RADIUS if not spring else 2 * RADIUS
-            name, where = f"radius of tool {tool}", f"tool {tool}"
-            causes.append(
-                Cause(
-                    name,
-                    "tool",
-                    CauseKind.SHIFT,
-                    deviation,
-                    "m",
-                    parameter="radius",
-                    weight=-radial,
-                    place=where,
-                )
-            )
-        if np.abs(own * along).max() > 0.05:
-            name, where = f"length of tool {tool}", f"tool {tool}"
-            causes.append(
-                Cause(
-                    name,
-                    "tool",
-                    CauseKind.SHIFT,
-                    LENGTH,
-                    "m",
-                    parameter="length",
-                    weight=own * along,
-                    place=where,
-                )
-            )
+        for name, weight, value, ci95, usual in (
+            ("radius", -radial, known.radius, known.radius_ci95, 2 * RADIUS if spring else RADIUS),
+            ("length", own * along, known.length, known.length_ci95, LENGTH),
+        ):
+            if np.abs(weight).max() <= 0.05:
+                continue
+            deviation = usual if ci95 is None else max(ci95, LEAST_CI95) / COVERAGE
+            cause = Cause(f"{name} of tool {tool}", "tool", CauseKind.SHIFT, deviation, "m")
+            causes.append(replace(cause, parameter=name, value=value, weight=weight, place=f"tool {tool}"))
     return causes
 
 

@@ -142,5 +142,13 @@ CODES = define(
             action="Check what changed between the parts before the next one is cut.",
             example="A new cutter with another radius.",
         ),
+        "LRN018": Code(
+            "info",
+            "tool or base differs from what is programmed",
+            meaning="Its radius, length or place is not what control, program and cell state, probably or surely.",
+            consequence="The next program corrects it; other programs do so only if the cell states it.",
+            action="Check it: set it in the control, or add the lines of the learnt file to the cell, never both.",
+            example="A cutter that was ground is 0.03 mm smaller.",
+        ),
     }
 )

@@ -78,13 +78,25 @@ def weigh_effects(
             with_them = max(one.evidence for one in bare) + _outside(points)
             present[effect.name] = max(present[effect.name], with_them)
         found.append(max((weighed(effect, *one) for one in options), key=lambda one: one.gain))
-    found.sort(key=lambda one: -one.gain)
+    found = _averaged_widths(found)
     for i, one in enumerate(found[:REFINED]):
         rows = np.flatnonzero(one.kept)
         own = explained if one.kept is kept else everything.part(rows)
         full = choose_surface(own.with_columns(one.factor * one.effect.columns[rows]), 1)
         again = weighed(one.effect, one.kept, own.with_surface(full.surface))
         found[i] = replace(again, gain=max(one.gain, again.gain))
+    return sorted(found, key=lambda one: -one.gain)
+
+
+def _averaged_widths(weighed: Sequence[WeighedEffect]) -> list[WeighedEffect]:
+    """One entry a name, the likeliest first: an effect that was tried with two widths of a gap has their mean."""
+    by_name: dict[str, list[WeighedEffect]] = {}
+    for one in weighed:
+        by_name.setdefault(one.effect.name, []).append(one)
+    found = []
+    for same in by_name.values():
+        gain = float(logsumexp([one.gain for one in same]) - np.log(len(same)))
+        found.append(replace(max(same, key=lambda one: one.gain), gain=gain))
     return sorted(found, key=lambda one: -one.gain)
 
 

@@ -8,16 +8,16 @@ at this place only, the smooth displacement that no cause explains.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
-from postproc.base.geometry import Poses, turned
+from postproc.base.geometry import Poses
 from postproc.base.units import MM
 from postproc.compensation.desired_path import DesiredPath
 from postproc.compensation.known_error import KnownError
+from postproc.compensation.tool_displacement import ToolDisplacement
 from postproc.learning.attribution import Attribution
 from postproc.learning.causes import CauseKind
 from postproc.process.force_factors import ForceFactors
@@ -88,19 +88,11 @@ def corner_size(result: Attribution) -> float:
 class LearnedError(KnownError):
     """What was learnt of a part beside robot and forces.
 
-    spindle (N, 3): unit vectors, tip-ward, in tool axes; tool (N,): its number; length: number of a tool -> [m]
-    by which it is longer; radius: (operation -> side of the feed, -1 or 1) and tool
-    -> [m]; base (6,): shift [m] and turn [rad] about ``centre`` (3,) in the axes (3, 3) of the base; drift (3,) [m]
-    over the whole program, with ``time`` (N,) 0..1; corners: where the force is larger there."""
+    tool: longer and thicker tools; base (6,): shift [m] and turn [rad] about ``centre`` (3,) in the axes (3, 3) of the
+    base; drift (3,) [m] over the whole program, with ``time`` (N,) 0..1; corners: where the force is larger there."""
 
     result: Attribution
-    path: DesiredPath
-    spindle: Floats
-    tool: Ints
-    operations: OperationNames
-    side: Mapping[str, int]
-    length: Mapping[int, float] = field(default_factory=dict)
-    radius: Mapping[int, float] = field(default_factory=dict)
+    tool: ToolDisplacement
     base: Floats = field(default_factory=lambda: np.zeros(6))
     centre: Floats = field(default_factory=lambda: np.zeros(3))
     axes: Floats = field(default_factory=lambda: np.eye(3))
@@ -111,13 +103,7 @@ class LearnedError(KnownError):
     def at(self, rows: Ints, wanted: Poses, share: Floats | None = None) -> Floats:
         """(K, 3) [m] of motions ``rows`` (K,) at ``wanted`` (K) poses, at ``share`` (K,) of their paths."""
         along = np.ones(len(rows)) if share is None else share
-        moved = self.result.field_at(wanted.position)
-        axis = turned(wanted.rotation, self.spindle[rows])
-        tool = self.tool[rows]
-        for number, size in self.length.items():
-            moved += np.where(tool == number, size, 0.0)[:, None] * axis
-        if self.radius and self.side:
-            moved += self._radial(rows, along, axis, tool)
+        moved = self.result.field_at(wanted.position) + self.tool.at(rows, wanted, along)
         if self.base.any():
             place = (wanted.position - self.centre) @ self.axes
             moved += (self.base[:3] + np.cross(self.base[3:], place)) @ self.axes.T
@@ -128,62 +114,28 @@ class LearnedError(KnownError):
             moved += self.corners.at(rows, along)
         return np.nan_to_num(moved)
 
-    def _radial(self, rows: Ints, along: Floats, axis: Floats, tool: Ints) -> Floats:
-        """(K, 3) [m] a larger radius lies deeper in the material, on its side of the feed."""
-        side = np.array([self.side.get(name, 0) for name in self.operations.names])[
-            self.operations.which[rows]
-        ]
-        size = np.zeros(len(rows))
-        for number, radius in self.radius.items():
-            size += np.where(tool == number, radius, 0.0)
-        across = np.cross(axis, self.path.tangent(rows, along))
-        long = np.linalg.norm(across, axis=1, keepdims=True)
-        return np.asarray((side * size)[:, None] * np.where(long > 0.1, across / np.maximum(long, 0.1), 0.0))
-
 
 def learned_error(
     result: Attribution,
-    path: DesiredPath,
-    spindle: Floats,
-    tool: Ints,
-    operations: OperationNames,
+    tool: ToolDisplacement,
     rigid: tuple[Floats, Floats],
     time: Floats,
     corners: CornerError | None,
 ) -> LearnedError:
-    """The known error of an attribution; spindle (N, 3) in tool axes; tool (N,): numbers; rigid: centre (3,) [m] and
-    axes (3, 3) of the base; time (N,) 0..1; corners: where a force in corners was learnt."""
-    length: dict[int, float] = {}
-    radius: dict[int, float] = {}
+    """The known error of an attribution; tool: as it was learnt; rigid: centre (3,) [m] and axes (3, 3) of the base;
+    time (N,) 0..1; corners: where a force in corners was learnt."""
     base, drift = np.zeros(6), np.zeros(3)
     for cause, value in zip(result.causes, result.x.tolist(), strict=True):
-        if cause.kind is not CauseKind.SHIFT:
-            continue
-        if cause.group == "tool":
-            (radius if cause.parameter == "radius" else length)[int(cause.place.split()[-1])] = value
-        elif cause.group == "base":
+        if cause.kind is CauseKind.SHIFT and cause.group == "base":
             base["xyzuvw".index(cause.parameter)] = value
-        elif cause.place == "drift":
+        elif cause.kind is CauseKind.SHIFT and cause.place == "drift":
             drift["xyz".index(cause.parameter)] = value
-    return LearnedError(
-        result,
-        path,
-        spindle,
-        tool,
-        operations,
-        _sides(result, path, operations),
-        length,
-        radius,
-        base,
-        *rigid,
-        drift,
-        time,
-        corners,
-    )
+    return LearnedError(result, tool, base, *rigid, drift, time, corners)
 
 
-def _sides(result: Attribution, path: DesiredPath, operations: OperationNames) -> dict[str, int]:
-    """Operation -> side of the feed, seen along the spindle, on which its measured walls lie, where that is one."""
+def wall_sides(result: Attribution, path: DesiredPath, operations: OperationNames) -> dict[str, int]:
+    """Operation -> side of the feed, 1: right, -1: left, seen along the spindle towards the tip, on which its measured
+    walls lie, where that is one."""
     points = result.prediction.points
     tangent = path.tangent(points.row, points.share)
     across = np.cross(points.spindle, tangent)

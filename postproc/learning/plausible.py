@@ -32,8 +32,8 @@ QUIET, FEW = 0.5, 12
 FAR_OUT = 5.0
 """Standard deviations before the measurement beyond which a cause is no longer one."""
 
-LOUD = 3.0
-"""Deviations that are so many times the scatter of the probe have something to explain."""
+REMAINING = 1.8
+"""Deviations of left-out points that remain are too large for a probe from so many times its scatter on."""
 
 UNEXPLAINED = 0.6
 """Share of the deviations of left-out points that may remain."""
@@ -254,9 +254,9 @@ def check_explained(result: Attribution, file: str) -> list[Finding]:
     )
     aligned = alone.left_out()
     sigma = own.layout.sigma
-    loud = float(np.sqrt(np.mean(aligned**2))) > LOUD * float(np.sqrt(np.mean(sigma**2)))
+    remains = float(np.sqrt(np.mean(rest**2))) > REMAINING * float(np.sqrt(np.mean(sigma**2)))
     share = float(np.mean(rest**2) / max(float(np.mean(aligned**2)), 1e-18))
-    if loud and share > UNEXPLAINED:
+    if remains and share > UNEXPLAINED:
         message = (
             f"the causes predict held-out points no better than nothing does ({100 * share:.0f} % of the squares remain"
             "): rows may be in another order than their deviations, or the part is another one"

@@ -23,8 +23,9 @@ from postproc.effects.play import play_output, share
 from postproc.model import StiffnessModel
 from postproc.robot.inverse import inverse
 
-LITTLE_GAP = 5e-5
-"""[rad, m] Gap by which the side of an axis is found where nothing is known of it."""
+LITTLE_GAP, WIDE_GAP = 5e-5, 2e-4
+"""[rad, m] Gaps by which the side of an axis is found: of a new gear, and of a worn one, which short reversals do not
+cross."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +35,7 @@ class TouchedPoints:
     on the flange; wrench (K, 6) [N, N m] at the TCP and to_contact (K, 3) [m] from there, in the robot base; axes (K,
     3, 3) of the base; conditions (K) loaded, at_rest (K) without force; spindle (K, 3): unit vector, tip-ward, in the
     robot base; process: of the cell's ``correct``; direction (K, n): side of each axis by the order of the motions;
-    good (K,): in reach."""
+    wide_direction (K, n): the same in a wide gap; good (K,): in reach."""
 
     row: Ints
     share: Floats
@@ -52,15 +53,21 @@ class TouchedPoints:
     spindle: Floats
     process: bool
     direction: Floats
+    wide_direction: Floats
     good: Bools
 
     def __len__(self) -> int:
         return len(self.row)
 
+    def with_wide_gaps(self) -> TouchedPoints:
+        """The same with the sides that the axes have in wide gaps."""
+        return replace(self, direction=self.wide_direction)
+
     def part(self, rows: Ints | Bools) -> TouchedPoints:
         """Some of them (J,)."""
         names = ("row", "share", "point", "normal", "q", "q_goal", "wanted", "wrench", "to_contact", "axes")
-        arrays = {name: getattr(self, name)[rows] for name in (*names, "spindle", "direction", "good")}
+        more = ("spindle", "direction", "wide_direction", "good")
+        arrays = {name: getattr(self, name)[rows] for name in (*names, *more)}
         return replace(
             self,
             tool=self.tool[rows],
@@ -144,21 +151,23 @@ def touched_points(
         at_rest=task.between_sides(row),
         spindle=turned(wanted.rotation, spindle[row]),
         process=task.process,
-        direction=_sides(task, row, along),
+        direction=_sides(task, row, along, LITTLE_GAP),
+        wide_direction=_sides(task, row, along, WIDE_GAP),
         good=np.asarray(found.reachable & goal.reachable),
     )
 
 
-def _sides(task: CompensationProblem, row: Ints, along: Floats) -> Floats:
-    """(K, n) -1..1 side of each axis on its gap, by the joint values at the ends of the motions in their order."""
+def _sides(task: CompensationProblem, row: Ints, along: Floats, gap: float) -> Floats:
+    """(K, n) -1..1 side of each axis on its ``gap`` [rad], by the joint values at the ends of the motions in their
+    order."""
     q = task.track.q
     known = np.asarray(np.isfinite(q).all(axis=1))
     restart = ~known | ~task.toolpath.continues
     filled = np.where(known[:, None], q, 0.0)
-    output = play_output(filled, np.full(q.shape[1], LITTLE_GAP), restart)
+    output = play_output(filled, np.full(q.shape[1], gap), restart)
     before = np.maximum(row - 1, 0)
     motor = filled[before] + along[:, None] * (filled[row] - filled[before])
-    behind = np.clip(output[before], motor - 0.5 * LITTLE_GAP, motor + 0.5 * LITTLE_GAP)
-    side = share(motor, behind, np.full(q.shape[1], LITTLE_GAP))
+    behind = np.clip(output[before], motor - 0.5 * gap, motor + 0.5 * gap)
+    side = share(motor, behind, np.full(q.shape[1], gap))
     side[~known[row] | ~known[before]] = 0.0
     return side

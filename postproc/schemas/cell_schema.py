@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from postproc.cell import AXES, KEYS, MODES
 from postproc.cell.stated_room import RANGES
+from postproc.cell.tool_errors import LARGEST, WALL_SIDES
 from postproc.robot.external_axes import FIXED, NAMES, POSITIONER, TRACK
 from postproc.robot.read_external_axes import DIRECTIONS
 from postproc.schemas.parts import Schema, flag, known, listed, mapping, number, numbers, text
@@ -103,6 +104,27 @@ CELL: dict[str, Schema] = {
                     "turn": numbers(2, 2, "of its direction, deg: lift and swing"),
                 },
                 required=("factor",),
+            )
+        },
+    ),
+    "tool_errors": mapping(
+        {},
+        about="number of a tool -> what `learn` found of it",
+        patterns={
+            _NUMBERED: mapping(
+                {
+                    "radius": number("by which it is larger, mm", -LARGEST, LARGEST),
+                    "radius_ci95": number("half width of the 95 % interval, mm", 0.0, LARGEST),
+                    "length": number("by which it is longer, mm", -LARGEST, LARGEST),
+                    "length_ci95": number("half width of the 95 % interval, mm", 0.0, LARGEST),
+                    "walls": mapping(
+                        {},
+                        about="operation, or others -> side of the feed, seen along the spindle, on which the wall is",
+                        patterns={".+": text(choices=[*WALL_SIDES])},
+                    ),
+                },
+                anyOf=[{"required": ["radius"]}, {"required": ["length"]}],
+                dependentRequired={"radius_ci95": ["radius"], "length_ci95": ["length"]},
             )
         },
     ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from postproc.base.arrays import Floats
 from postproc.cell import Cell
-from postproc.cell.description import OTHERS
+from postproc.cell.tool_errors import OTHERS
 from postproc.process import Wrenches
 from postproc.process.force_factors import ForceFactors
 from postproc.process.operation_names import OperationNames, name_operations

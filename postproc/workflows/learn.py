@@ -19,7 +19,7 @@ from postproc.learning.attribution import Attribution, attribute
 from postproc.learning.causes import CausePrediction, PriorKnowledge
 from postproc.learning.history import RecordedStep
 from postproc.learning.measured_part import MeasuredPart, read_measured_part
-from postproc.learning.next_program import force_factors, learned_error
+from postproc.learning.next_program import force_factors, learned_error, wall_sides
 from postproc.learning.other_readings import check_readings
 from postproc.learning.plausible import FirstLook, check_deviations, check_explained
 from postproc.learning.promise import Promise, measured_rms, promise
@@ -31,6 +31,7 @@ from postproc.process import Wrenches
 from postproc.report.learned import Learned, LearnedPart, learned_csv
 from postproc.report.report import exit_code, in_order_of_place, json_bytes
 from postproc.robot.description import robot_of
+from postproc.workflows.cell_tool_errors import tool_displacement
 from postproc.workflows.learn_commands import cutting_file
 from postproc.workflows.learn_corners import corner_error
 from postproc.workflows.learn_history import (
@@ -43,6 +44,7 @@ from postproc.workflows.learn_history import (
 )
 from postproc.workflows.learn_points import CutProgram, Matched, match, read_job
 from postproc.workflows.learn_robot import force_factor_lines, learned_robot_file
+from postproc.workflows.learn_tool import tool_and_base_findings, tool_error_lines, tool_errors
 from postproc.workflows.preparation import LearnedInputs, Request, Stage, silent
 from postproc.workflows.program import compensate
 
@@ -112,6 +114,8 @@ def learn(request: LearnRequest, stage: Stage = silent) -> Learned:
     history = _history(parts, programs, remembered, matched, result)
     findings = [*(f for part in parts for f in part.findings), *job.findings, *matched.findings]
     findings += [*remembered.findings, *_findings(parts, matched, result, promised), *_unkept(parts, history)]
+    lines = f"{main.program.stem}.tool_errors.yaml"
+    findings += tool_and_base_findings(result, file, lines)
     learned = Learned(
         program=str(main.program),
         robot=job.ready.robot.name,
@@ -240,7 +244,9 @@ def _learned_inputs(job: CutProgram, matched: Matched, result: Attribution) -> L
     rigid = matched.centre, matched.axes
     corners = corner_error(job, result, forces(task.force))
     path = task.desired_path
-    error = learned_error(result, path, job.spindle, job.tool, job.operations, rigid, job.time, corners)
+    errors = tool_errors(result, job.ready.cell, wall_sides(result, path, job.operations))
+    tool = tool_displacement(errors, task, job.spindle, job.tool, job.operations)
+    error = learned_error(result, tool, rigid, job.time, corners)
     return LearnedInputs(forces, error)
 
 
@@ -267,6 +273,9 @@ def _published(
         files[robot_path] = content
     if factors:
         files[folder / f"{main.program.stem}.force_factors.yaml"] = factors
+    sides = wall_sides(result, job.ready.task.desired_path, job.operations)
+    if tools := tool_error_lines(result, parts, job.ready.cell, sides):
+        files[folder / f"{main.program.stem}.tool_errors.yaml"] = tools
     own = folder / f"{main.program.stem}.learned.json"
     extra = [path for path in (request.csv, request.page, request.json) if path is not None]
     _spare(request, job, parts, [*files, own, *extra, remembered.path])

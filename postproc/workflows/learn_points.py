@@ -32,11 +32,11 @@ from postproc.learning.plausible import FEW_BESIDE, TOUCHED, check_contacts, che
 from postproc.learning.touched_points import TouchedPoints, touched_points
 from postproc.part.contact import Contacts, CuttingMotions, find_contacts
 from postproc.process.operation_names import OperationNames
-from postproc.process.stock.cutters import Cutter
-from postproc.process.stock.stock_section import has_stock, read_stock_process
 from postproc.verification.pairing import Pairing
 from postproc.workflows.cell_force_factors import operations_of
+from postproc.workflows.cell_tool_errors import tool_numbers
 from postproc.workflows.learn_commands import commands_at, cutting_program
+from postproc.workflows.learn_cutters import cutters_of
 from postproc.workflows.preparation import Prepared, Request, prepare
 
 WIDE = 2 * MM
@@ -106,8 +106,8 @@ def read_job(request: Request) -> CutProgram:
             Finding("LRN011", message, program, help="state the forces, as the main job needs them")
         )
     frames = frames_of(cell, path, program)
-    numbers = np.array([frame.number or 0 for frame in path.frames] + [0])[path.tool]
-    cutters, findings = _cutters(ready, numbers[task.carries], program)
+    numbers = tool_numbers(path)
+    cutters, findings = cutters_of(ready, numbers)
     known = {cutter.number: index for index, cutter in enumerate(cutters)}
     desired = task.desired_path
     rows = np.flatnonzero(
@@ -141,35 +141,6 @@ def read_job(request: Request) -> CutProgram:
         tuple(cutter.number for cutter in cutters if cutter.shape == "ball"),
         findings,
     )
-
-
-def _cutters(ready: Prepared, used: Ints, program: str) -> tuple[tuple[Cutter, ...], tuple[Finding, ...]]:
-    """The tools that cut: of the process file, else flat ends with the diameter that cell or process state."""
-    cell, numbers = ready.cell, np.unique(used).tolist()
-    stated: dict[int, Cutter] = {}
-    if cell.process is not None and has_stock(cell.path.parent / cell.process):
-        stated = read_stock_process(cell.path.parent / cell.process).cutters
-    findings, cutters = [], []
-    for number in numbers:
-        if number in stated:
-            cutters.append(stated[number])
-            continue
-        tool = cell.tools.get(number)
-        diameter = None if tool is None else tool.diameter
-        if diameter is None and ready.wrenches.radius is not None:
-            radii = ready.wrenches.radius[ready.wrenches.carries]
-            radii = np.unique(radii[np.isfinite(radii)])
-            diameter = 2 * float(radii[0]) if len(radii) == 1 else None
-        if diameter is None:
-            continue
-        cutters.append(Cutter(number, "flat", 0.5 * diameter))
-        message = f"tool {number} is taken as a flat end of {diameter / MM:g} mm, the diameter that is stated"
-        findings.append(Finding("LRN007", message, str(cell.path)))
-    if not cutters:
-        message = "neither the process file nor the cell states the shape or the diameter of a tool that cuts"
-        help = "add diameter: 16 to the tool in the cell, or its shape to tools: of the process file"
-        raise Refusal(Finding("LRN011", message, str(cell.path), help=help))
-    return tuple(cutters), tuple(findings)
 
 
 def match(
@@ -209,7 +180,8 @@ def match(
     cause_list = robot_causes(job.ready.model)
     cause_list += force_causes(operation, job.operations.names, known)
     spring = all(part.spring_pass for part in parts)
-    cause_list += tool_causes(points, job.tool[points.row], job.ball, spring)
+    stated = job.ready.cell.tool_errors
+    cause_list += tool_causes(points, job.tool[points.row], job.ball, spring, stated)
     constrained = [one for one in range(6) if fixed[:, one].any()]
     cause_list += base_causes(rigid * fixed, constrained)
     layout = Layout(

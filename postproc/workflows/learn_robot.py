@@ -10,7 +10,8 @@ import numpy as np
 
 from postproc import __version__
 from postproc.cell import Cell
-from postproc.cell.description import OTHERS, ForceFactor
+from postproc.cell.description import ForceFactor
+from postproc.cell.tool_errors import OTHERS
 from postproc.learning.attribution import Attribution
 from postproc.learning.causes import Cause, CauseKind
 from postproc.learning.measured_part import MeasuredPart

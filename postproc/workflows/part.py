@@ -25,7 +25,7 @@ def part_error_of(
     run = task.force.stock
     assert isinstance(run, StockRun)
     factored = bool(ready.cell.force_factors) or task.known_error is not None
-    why = "their factors are those of a measured part" if factored else ""
+    why = "a measured part showed how they and the tool differ" if factored else ""
     part = find_part_error(task, run, division, as_nominal=why)
     if isinstance(part, Finding):
         return None, (part,)

@@ -39,6 +39,7 @@ from postproc.robot.orientation_modes import as_run
 from postproc.robot.read_external_axes import fill_external_axes, follow_external_axes
 from postproc.toolpath import Toolpath
 from postproc.workflows.cell_force_factors import factored
+from postproc.workflows.cell_tool_errors import cell_tool_displacement
 from postproc.workflows.correction_mode import corrected_model, mode_findings, temperature_rise, touch_off
 from postproc.workflows.reading_findings import configuration_findings, reader_findings
 
@@ -258,8 +259,13 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
     task = add_force_ramps(task, _ramp(cell, path, force))
     spacing = np.maximum(cell.min_segment, 1e-3 * cell.cycle_ms * np.nan_to_num(path.feed))
     task = add_lost_motion(task, start, spacing)
+    tool_findings: tuple[Finding, ...] = ()
+    if learned is None and cell.tool_errors:
+        known, tool_findings = cell_tool_displacement(cell, task, frames)
+        task = replace(task, known_error=known)
     findings = [
         *cell.findings,
+        *tool_findings,
         *reader_findings(program, path),
         *orientation_findings,
         *force.findings,

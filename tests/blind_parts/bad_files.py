@@ -1,6 +1,6 @@
 """Files of measured parts with a mistake in them: how many of them are learnt from.
 
-    python -m tests.blind_parts.bad_files [--draws 20] [--seed 0]
+    python -m tests.blind_parts.bad_files [--draws 20] [--seed 0] [--minutes M]
 
 Each draw cuts a part of its own; its file gets one mistake at a time, and one copy gets none.
 """
@@ -12,6 +12,7 @@ import hashlib
 import os
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -137,6 +138,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--draws", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--minutes", type=float, default=float("inf"), help="no draw starts after so many")
     parser.add_argument("--only", default=",".join(MISTAKES))
     parser.add_argument("--details", action="store_true")
     chosen = parser.parse_args()
@@ -145,7 +147,10 @@ def main() -> None:
         original = write_shop(Path(name) / "shop")
         shop, compensated = original.parent, original.parent / "compensated" / "part.src"
         compensate(Request(original, force=""))
+        end = time.monotonic() + 60 * chosen.minutes
         for number in range(chosen.draws):
+            if time.monotonic() > end:
+                break
             rng = np.random.default_rng([chosen.seed + number, 31])
             surface = surface_of(shop, *surface_points(COUNT, rng))
             operations = [one for one in surface.program.operations.names if one != "tool 1"]

@@ -254,9 +254,8 @@ def _elsewhere(
     away = surface_of(shops[1], *points)
     before = aligned_rms(away, cut(away, truth, plant, shops[1] / "compensated" / "part.src", rng))
     learned = list((shops[0] / out).glob("*_learned.yaml"))
-    factors = (shops[0] / out / "part.force_factors.yaml").read_text()
     cell = shops[1] / "cell_learned.yaml"
-    cell.write_text((shops[1] / "cell.yaml").read_text() + factors)
+    cell.write_text((shops[1] / "cell.yaml").read_text() + _lines_for_the_cell(shops[0] / out))
     request = Request(
         shops[1] / "part.src", force="", cell=cell, robot=str(learned[0]) if learned else None,
         output=shops[1] / "transferred" / "part.src",
@@ -264,6 +263,12 @@ def _elsewhere(
     compensate(request)
     after = aligned_rms(away, cut(away, truth, plant, shops[1] / "transferred" / "part.src", rng))
     return {"place_before": before, "place_after": after}
+
+
+def _lines_for_the_cell(learned: Path) -> str:
+    """Force factors and tool errors, where the part says something of a tool."""
+    tool = learned / "part.tool_errors.yaml"
+    return (learned / "part.force_factors.yaml").read_text() + (tool.read_text() if tool.is_file() else "")
 
 
 def _other_operations(
@@ -279,7 +284,7 @@ def _other_operations(
     names = [name for name in other.program.operations.names if name != "tool 1"]
     truth = replace(truth, **draw_forces(rng, names))
     cell = folder / "cell_learned.yaml"
-    cell.write_text((folder / "cell.yaml").read_text() + (home / out / "part.force_factors.yaml").read_text())
+    cell.write_text((folder / "cell.yaml").read_text() + _lines_for_the_cell(home / out))
     learned = list((home / out).glob("*_learned.yaml"))
     sizes = {}
     for key, own, robot in (

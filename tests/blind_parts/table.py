@@ -76,8 +76,9 @@ def _place(answers: Sequence[dict[str, Any]]) -> list[str]:
     worse = sum(bool(value < 0) for value in removed)
     return [
         "",
-        f"another place, robot file and force factors only: {median_interval(removed)} % removed, 5th percentile"
-        f" {median_interval(removed, 0.05)}, worse {share_interval(worse, len(done))} % ({len(done)} draws)",
+        f"another place, robot file, force factors and tool errors only: {median_interval(removed)} % removed,"
+        f" 5th percentile {median_interval(removed, 0.05)}, worse {share_interval(worse, len(done))} %"
+        f" ({len(done)} draws)",
     ]
 
 
