@@ -14,12 +14,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.parts import MAKERS
+from benchmarks.parts import program as made
 from numpy._core.multiarray import get_handler_name
 
 from postproc import api
-from postproc.base import batches, paged_memory
+from postproc.base import batches, geometry, paged_memory
 from postproc.base.array_storage import ArrayStore, GrowingColumns
 from postproc.base.findings import Refusal
+from postproc.languages.core import plan_rows
+from postproc.languages.krl import dependent_targets, inserting, motion_table, writer
+from postproc.languages.rapid import module_toolpath
 
 SAMPLES = Path(__file__).parents[1] / "samples"
 PROGRAMS = (
@@ -27,6 +32,8 @@ PROGRAMS = (
     "m900ib_pocket/pocket.ls",
     "kr270_pocket/pocket.ngc",
 )
+LANGUAGE_BLOCKS = plan_rows, dependent_targets, inserting, motion_table, writer, module_toolpath
+"""Modules that work on ``BLOCK`` motions at a time."""
 FILES = "postproc_files"
 """numpy's name of the handler."""
 
@@ -77,6 +84,53 @@ def test_samples_have_the_same_bytes(name, tmp_path, monkeypatch, request):
     for rows, threads in ((7, 2), (4096, 4)):
         set_blocks(monkeypatch, rows, threads)
         assert results(program, tmp_path / "one") == expected
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("language", MAKERS)
+def test_generated_programs_have_the_same_bytes(language, tmp_path, monkeypatch, request):
+    """As they are in memory on one thread; and ``verify`` finds the same figures in them."""
+    program = made(tmp_path / "part", language, 12)
+    output = tmp_path / "one"
+    set_blocks(monkeypatch, batches.ROWS, 1)
+    expected = results(program, output)
+    verified = api.verify(program, output / program.name, force=True).to_dict()
+    request.getfixturevalue("small")
+    for rows, threads in ((1, 4), (7, 2), (4096, 1)):
+        set_blocks(monkeypatch, rows, threads)
+        for module in LANGUAGE_BLOCKS:
+            monkeypatch.setattr(module, "BLOCK", rows)
+        monkeypatch.setattr(geometry, "STORED", rows)
+        assert results(program, output) == expected
+        assert api.verify(program, output / program.name, force=True).to_dict() == verified
+
+
+@pytest.mark.parametrize("command", ["verify", "learn", "place", "assign", "engage"])
+def test_every_command_that_reads_a_program_has_room_for_a_large_one(command, monkeypatch):
+    """It is asked for with the size of all programs before the first of them is read."""
+    asked = []
+
+    class Asked(Exception):
+        pass
+
+    def ask(room: int, program: Path) -> None:
+        asked.append((room, program))
+        raise Asked
+
+    monkeypatch.setattr(paged_memory, "PROGRAM", 0)
+    monkeypatch.setattr(paged_memory, "temporary_folder", ask)
+    program = SAMPLES / "kr270_taught" / "taught.src"
+    calls = {
+        "verify": lambda: api.verify(program, program, force=True),
+        "learn": lambda: api.learn(program, [SAMPLES / "no_such.csv"], force=True),
+        "place": lambda: api.place([program, program], force=True),
+        "assign": lambda: api.assign([program, program], places={}, force=True),
+        "engage": lambda: api.engage(program),
+    }
+    with pytest.raises(Asked):
+        calls[command]()
+    several = command in ("verify", "place", "assign")
+    assert asked == [(paged_memory.ROOM * program.stat().st_size * (1 + several), program)]
 
 
 def test_large_arrays_lie_in_files_and_outlive_the_run(small):

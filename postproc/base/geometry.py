@@ -68,6 +68,15 @@ class Poses:
         """Sets ``rows`` to ``poses``."""
         self.rotation[rows], self.position[rows] = poses.rotation, poses.position
 
+    def read_only(self) -> Poses:
+        """The same poses; their arrays cannot be changed any more."""
+        self.rotation.setflags(write=False)
+        self.position.setflags(write=False)
+        return self
+
+
+STORED = 1 << 14
+"""Poses that are stored rather than computed again."""
 
 SMALL = 0.01
 """[rad] Angles up to which the first four terms of a series hold to rounding."""
@@ -94,16 +103,16 @@ class PoseRows:
         return self.count
 
     def remembered(self) -> PoseRows:
-        """The same, which in each thread remembers the last rows that it was asked for: those of a block are asked for
-        again and again."""
+        """The same: few are computed at once and stored; of more, each thread remembers the last rows that it was asked
+        for, as those of a block are asked for again and again."""
+        if self.count <= STORED:
+            return PoseRows(self.count, self[:].read_only().__getitem__)
         last = threading.local()
 
         def build(rows: Ints) -> Poses:
             if getattr(last, "rows", None) is not rows:
                 poses = self.build(rows)
-                for array in (poses.rotation, poses.position):
-                    array.setflags(write=False)
-                last.rows, last.poses = rows, poses
+                last.rows, last.poses = rows, poses.read_only()
             last_poses: Poses = last.poses
             return last_poses
 

@@ -72,15 +72,16 @@ current_storage: ContextVar[PagedStorage | None] = ContextVar("current_storage",
 
 
 @contextmanager
-def large_arrays_in_files(program: Path) -> Iterator[None]:
-    """What is computed inside of it from a ``program`` larger than ``PROGRAM`` takes memory that is bounded, and room
-    for temporary files; smaller ones, and systems without such files, are computed in memory as always.
+def large_arrays_in_files(*programs: Path) -> Iterator[None]:
+    """What is computed inside of it from ``programs`` that are together larger than ``PROGRAM`` takes memory that is
+    bounded, and room for temporary files; smaller ones, and systems without such files, are computed in memory as
+    always.
 
     Raises Refusal FIL013 where neither the disk nor the memory has enough room.
     """
-    size, folder = _size(program), None
+    size, folder = sum(map(_size, programs)), None
     if sys.platform == "linux" and current_storage.get() is None and size >= PROGRAM:
-        folder = temporary_folder(ROOM * size, program)
+        folder = temporary_folder(ROOM * size, programs[0])
     if folder is None:
         yield
         return

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.base.findings import Finding, Refusal
+from postproc.base.paged_memory import large_arrays_in_files
 from postproc.base.units import MM
 from postproc.cell import frames_of
 from postproc.output.atomic_write import write_atomically
@@ -40,6 +41,11 @@ class EngageRequest:
 
 def engage(request: EngageRequest, stage: Stage = silent) -> Engaged:
     """What each motion cuts, and with which force.  Raises Refusal, and has then written nothing."""
+    with large_arrays_in_files(request.program):
+        return _engage(request, stage)
+
+
+def _engage(request: EngageRequest, stage: Stage) -> Engaged:
     cell = cell_of(Request(request.program, cell=request.cell, robot=request.robot))
     process = request.process
     if process is None and cell.process is not None:

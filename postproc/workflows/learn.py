@@ -12,6 +12,7 @@ import numpy as np
 
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import place
+from postproc.base.paged_memory import large_arrays_in_files
 from postproc.base.read_files import read_file
 from postproc.base.system import relative_path
 from postproc.base.units import MM
@@ -75,6 +76,11 @@ class LearnRequest:
 
 def learn(request: LearnRequest, stage: Stage = silent) -> Learned:
     """Causes, values and the next program.  Raises Refusal, and has then written nothing."""
+    with large_arrays_in_files(request.main.program):
+        return _learn(request, stage)
+
+
+def _learn(request: LearnRequest, stage: Stage) -> Learned:
     main = request.main
     stage("reading")
     named = [read_measured_part(path) for path in request.measured]

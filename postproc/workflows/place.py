@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import Inputs, noted
+from postproc.base.paged_memory import large_arrays_in_files
 from postproc.base.units import DEG
 from postproc.output.atomic_write import write_atomically
 from postproc.placement.collisions import CollisionShapes, colliding_rows
@@ -37,7 +38,7 @@ present."""
 
 def place(request: PlaceRequest, stage: Stage = silent) -> Placement:
     """The places of a room by what the programs would cut there.  Raises Refusal, and has then written nothing."""
-    with noted() as inputs:
+    with large_arrays_in_files(*request.programs), noted() as inputs:
         return _place(request, inputs, stage)
 
 

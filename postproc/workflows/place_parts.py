@@ -13,6 +13,7 @@ from postproc.base.arrays import Floats, Ints
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import Inputs, noted
 from postproc.base.input_files import place as real_path
+from postproc.base.paged_memory import large_arrays_in_files
 from postproc.output.atomic_write import write_atomically
 from postproc.placement.collisions import CollisionShapes
 from postproc.placement.room import TURN, UNITS
@@ -41,7 +42,7 @@ class AssignRequest:
 def assign(request: AssignRequest, stage: Stage = silent) -> PartAssignment:
     """The assignment of parts to places with the least sum of their objectives, of the most parts that have a feasible
     place at all.  Raises Refusal, and has then written nothing."""
-    with noted() as inputs:
+    with large_arrays_in_files(*request.common.programs), noted() as inputs:
         return _assign(request, inputs, stage)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 from postproc.base.findings import Finding, Refusal
+from postproc.base.paged_memory import large_arrays_in_files
 from postproc.base.units import DEG, MM
 from postproc.output.atomic_write import write_atomically
 from postproc.report.report import Spread, exit_code, in_order_of_place, json_bytes
@@ -35,6 +36,11 @@ def verify(
     ``step`` [m]: distance of the first samples; ``page``: file of the result for a browser.
     Raises Refusal, VER001 where the second does not come from the first.
     """
+    with large_arrays_in_files(request.program, compensated):
+        return _verify(request, compensated, step, stage, page)
+
+
+def _verify(request: Request, compensated: Path, step: float, stage: Stage, page: Path | None) -> Verified:
     ready = prepare(request)
     stage("reading the compensated program")
     other = prepare(_without_force(request, compensated, ready))

@@ -1,4 +1,5 @@
-"""Milling programs of any size: a waving path over a part with a force for each motion, in KRL, G-code and RAPID.
+"""Milling programs of any size: a waving path over a part with a force for each motion, in KRL, G-code, RAPID
+and TP.
 
 Written block by block, so that the process that writes a million motions stays small: what a child process is said to
 have taken at most counts from its parent's size.
@@ -114,7 +115,29 @@ def rapid(folder: Path, count: int) -> Path:
     return folder / "big.mod"
 
 
-MAKERS: dict[str, Maker] = {"krl": krl, "gcode": gcode, "rapid": rapid}
+def tp(folder: Path, count: int) -> Path:
+    points = path(count)
+    head = ["/PROG BIG", "/MN", "   1:  UFRAME_NUM=1 ;", "   2:  UTOOL_NUM=1 ;", "   3:J P[1] 5% FINE    ;"]
+
+    def point(number: int, x: float, y: float, z: float) -> str:
+        axes = f"X = {x:9.3f}  mm,\tY = {y:9.3f}  mm,\tZ = {z:9.3f}  mm"
+        turns = "W =   180.000 deg,\tP =     0.000 deg,\tR =     0.000 deg"
+        head = f"P[{number}]{{\n   GP1:\n\tUF : 1, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n"
+        return f"{head}\t{axes},\n\t{turns}\n}};\n"
+
+    with open(folder / "big.ls", "w") as stream:
+        stream.writelines(f"{line}\n" for line in head)
+        stream.writelines(f"{n + 4:4d}:L P[{n + 2}] 50mm/sec CNT100    ;\n" for n in range(count))
+        stream.write("/POS\n" + point(1, *points[0, :2].tolist(), 50.0))
+        for start in range(0, count, BLOCK):
+            part = enumerate(points[start : start + BLOCK].tolist(), start + 2)
+            stream.writelines(point(number, *place) for number, place in part)
+        stream.write("/END\n")
+    forces(folder, np.arange(count) + len(head) + 1)
+    return folder / "big.ls"
+
+
+MAKERS: dict[str, Maker] = {"krl": krl, "gcode": gcode, "rapid": rapid, "tp": tp}
 
 
 def program(folder: Path, language: str, count: int) -> Path:

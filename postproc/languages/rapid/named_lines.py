@@ -226,12 +226,13 @@ class NamedReader:
         kinds, of_kind = np.unique(which, return_inverse=True)
         end = int(block.ends[these.stop - 1])
         self._spans.append((int(starts[0]), end))
+        offset = offset_type(len(raw))
         places = PlainPlaces(
-            starts=starts.astype(offset_type(len(raw))),
+            starts=starts.astype(offset),
             targets=(targets - starts).astype(np.int32),
             stops=(stops - starts).astype(np.int32),
-            literals=spots - starts[:, None],
-            literal_stops=spot_stops - starts[:, None],
+            literals=(spots - starts[:, None]).astype(offset),
+            literal_stops=(spot_stops - starts[:, None]).astype(offset),
             named=True,
         )
         return PlainMotions(

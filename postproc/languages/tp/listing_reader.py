@@ -5,14 +5,16 @@ from __future__ import annotations
 from codecs import BOM_UTF8
 from functools import partial
 
+import numpy as np
+
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
 from postproc.base.memory import without_garbage_collection
 from postproc.languages.core.row_facts import not_understood, shown
 from postproc.languages.dialect import EditSyntax, Program, ReadingSettings
-from postproc.languages.tp.position_data import TpPosition, read_positions
+from postproc.languages.tp.position_data import TpPositions, read_positions
 from postproc.languages.tp.statement_flow import StatementFlow
-from postproc.languages.tp.statement_parsing import parse_statement
+from postproc.languages.tp.statement_parsing import parse_statements
 from postproc.languages.tp.tp_listing import TpListing, read_listing
 from postproc.languages.tp.tp_propagation import TpPropagation, TpState
 from postproc.languages.tp.tp_remarks import find_marker
@@ -27,7 +29,7 @@ def read(documents: tuple[Document, ...], settings: ReadingSettings) -> Program:
     document = documents[0]
     listing = read_listing(document.raw)
     positions, strange_points = _positions(listing)
-    flow = StatementFlow([parse_statement(one) for one in listing.statements])
+    flow = StatementFlow(parse_statements(listing.statements))
     problem = _structure_problem(listing, flow, strange_points)
     if flow.problem is None and problem is not None:
         flow.problem = (0, problem[1])
@@ -53,10 +55,10 @@ def read(documents: tuple[Document, ...], settings: ReadingSettings) -> Program:
     )
 
 
-def _positions(listing: TpListing) -> tuple[dict[int, TpPosition], list[int]]:
+def _positions(listing: TpListing) -> tuple[TpPositions, list[int]]:
     start, stop = listing.points
     if start < 0:
-        return {}, []
+        return TpPositions(listing.raw), []
     first = listing.raw.find(b"\n", start) + 1 or len(listing.raw)
     return read_positions(listing.raw, first, stop if stop >= 0 else len(listing.raw))
 
@@ -73,9 +75,9 @@ def _structure_problem(
         return min(listing.strange), "text in /MN is no statement"
     if strange_points:
         return strange_points[0], "text in /POS is no point"
-    for one in listing.statements:
-        if not one.closed:
-            return one.line_start, "a statement has no ; at its end"
+    opened = np.flatnonzero(listing.statements.columns()[:, -1] == 0)
+    if len(opened):
+        return listing.statements[int(opened[0])].line_start, "a statement has no ; at its end"
     if flow.problem is not None:
         at, why = flow.problem
         return listing.statements[at].line_start, why

@@ -66,8 +66,8 @@ class _Options:
     skip: int | None = None
 
 
-def parse_motion(text: bytes, start: int) -> TpMove | None:
-    """The motion in the text of a statement that starts at byte ``start``; None where it is none that is known."""
+def parse_motion(text: bytes) -> TpMove | None:
+    """The motion in the text of a statement; None where it is none that is known."""
     head = _START.match(text)
     if head is None or head[1] in b"Ss":
         return None
@@ -77,11 +77,10 @@ def parse_motion(text: bytes, start: int) -> TpMove | None:
     for _ in range(2 if form == b"C" else 1):
         if points:
             at = _read_options(text, at, options)
-        point, at = _point(text, at, start)
+        point, at = _point(text, at)
         if point is None:
             return None
         points.append(point)
-    after_points = at
     speed = _speed(text, at)
     if speed is None:
         return None
@@ -101,7 +100,7 @@ def parse_motion(text: bytes, start: int) -> TpMove | None:
     problem = ("FTP002", reason) if reason else options.problem
     return TpMove(
         form, tuple(points), shown, value, unit, termination, corner[:2], b" ".join(options.carried), options.own,
-        options.wrist, problem, options.skip, (start + head.start(1), start + head.end(1)), start + after_points,
+        options.wrist, problem, options.skip, head.span(1),
     )  # fmt: skip
 
 
@@ -110,11 +109,10 @@ def is_motion_like(text: bytes) -> bool:
     return _START.match(text) is not None
 
 
-def _point(text: bytes, at: int, start: int) -> tuple[PointReference | None, int]:
+def _point(text: bytes, at: int) -> tuple[PointReference | None, int]:
     found = _POINT.match(text, at)
     if found is not None:
-        first, last = found.span(1)
-        return PointReference(int(found[1]), (start + first, start + last)), found.end()
+        return PointReference(found.span(1)), found.end()
     found = _OTHER_POINT.match(text, at)
     if found is None:
         return None, at
@@ -122,7 +120,7 @@ def _point(text: bytes, at: int, start: int) -> tuple[PointReference | None, int
         reason = "its target is a position register, which only the controller knows"
     else:
         reason = "the number of its point is computed where the program runs"
-    return PointReference(-1, (-1, -1), reason), found.end()
+    return PointReference((-1, -1), reason), found.end()
 
 
 def _speed(text: bytes, at: int) -> tuple[Operand, bytes, int] | None:

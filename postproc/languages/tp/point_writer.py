@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from codecs import BOM_UTF8
 from collections.abc import Iterator
+from itertools import chain, islice
 
 import numpy as np
 
+from postproc.base.arrays import Bools, Ints
+from postproc.base.decimals import fixed, literals
 from postproc.base.document import Edit, Edits, Span
 from postproc.base.findings import Finding
-from postproc.languages.core.plan_rows import blocks
+from postproc.languages.core.plan_rows import BLOCK, blocks
 from postproc.languages.dialect import EditedTargets, Plan, Program, Role, WritingSettings
 from postproc.languages.tp.position_data import TpPosition
-from postproc.languages.tp.tp_plan import NewPoints, SixNumbers, TpPlanNumbers
+from postproc.languages.tp.tp_plan import NewPoints, SixNumbers, TpPlanNumbers, value_and_decimals
 from postproc.languages.tp.tp_statements import TpMove
 from postproc.toolpath import Kind
 
@@ -41,27 +44,55 @@ class _PointWriter:
         arcs = np.flatnonzero(np.isfinite(task.path.arcs.sweep))
         way[arcs] |= touched[arcs - 1]  # the tool is to turn evenly from the new start
         divided = np.flatnonzero(task.plan.role != Role.ORIGINAL)
-        moved = np.flatnonzero(touched | way)
-        rewritten = self._rewritten_runs(set(moved.tolist()), set(task.plan.source[divided].tolist()))
-        chosen = np.array(sorted({*moved.tolist(), *rewritten}), np.int64)
-        edits = list(self._in_text(chosen, rewritten))
+        touched |= way
+        rewritten = self._rewritten_runs(touched, set(task.plan.source[divided].tolist()))
+        touched[list(rewritten)] = True
+        chosen = np.flatnonzero(touched)
+        alone = self._have_own_points(chosen, rewritten)
+        edits = list(self._in_text(chosen[~alone], rewritten))
+        numbers = [self._in_points(part) for part in blocks(chosen[alone])]
         lines = self._inserted(divided)
         if self.held:
             return EditedTargets((), self.held)
-        edits += self._numbered(lines, bool(edits))
+        edited = bool(edits) or any(map(len, numbers))
         if self.points.texts:
             at = task.places.listing.points[1]
             edits.append(Edit(Span(0, at, at), b"".join(self.points.texts)))
-        return EditedTargets(Edits.joined(edits))
+        counted = self._numbered(lines, edited)
+        parts = iter(lambda: list(islice(counted, BLOCK)), [])
+        return EditedTargets(Edits.collected(chain([edits], numbers, parts)))
 
-    def _rewritten_runs(self, moved: set[int], divided: set[int]) -> set[int]:
-        """Rows of runs of A motions of which one is moved, or an arc divided: their points are no longer on one circle,
-        so that the run is written as L and C."""
+    def _rewritten_runs(self, moved: Bools, divided: set[int]) -> set[int]:
+        """Rows of runs of A motions of which one is ``moved`` (N,), or an arc divided: their points are no longer on
+        one circle, so that the run is written as L and C."""
         runs = self.task.places.runs
         arcs = {row for row in divided if row in runs and row != runs[row][0]}
-        return {one for row in moved | arcs if row in runs for one in runs[row]}
+        return {one for row in runs if moved[row] or row in arcs for one in runs[row]}
 
-    def _in_text(self, rows: np.ndarray, rewritten: set[int]) -> Iterator[Edit]:
+    def _have_own_points(self, rows: Ints, rewritten: set[int]) -> Bools:
+        """(K,) whether of motions (K,) nothing is written but the numbers of a point that serves no other one."""
+        places = self.task.places
+        numbers = places.targets[rows]
+        if places.any_read:
+            return np.zeros(len(rows), np.bool_)
+        alone = np.fromiter(map(places.positions.is_common, numbers.tolist()), np.bool_, len(rows))
+        alone &= self.task.path.kind[rows] != Kind.CIRC
+        alone &= ~np.isin(numbers, [*places.shared, *places.read])
+        return np.asarray(alone & ~np.isin(rows, list(rewritten)))
+
+    def _in_points(self, rows: Ints) -> Edits:
+        """Edits of the numbers of the points of ``rows`` (K,) that have their own."""
+        task = self.task
+        spans = task.places.positions.common_spans(task.places.targets[rows].tolist())
+        start, stop = spans[:, ::2].ravel(), spans[:, 1::2].ravel()
+        _, written = literals(np.frombuffer(task.raw, np.uint8), start, stop, value_and_decimals)
+        decimals = np.maximum(written.reshape(-1, 6), task.least).ravel()
+        own, wanted = task.places.numbers[rows].ravel(), task.wanted(rows, task.own[rows]).ravel()
+        changed = ~(np.abs(wanted - own) <= 0.5 * 10.0**-decimals)
+        texts, ends = fixed(wanted[changed], decimals[changed])
+        return Edits(np.zeros(changed.sum(), np.int8), start[changed], stop[changed], texts, ends)
+
+    def _in_text(self, rows: Ints, rewritten: set[int]) -> Iterator[Edit]:
         """Edits of the points of ``rows`` (K,), and of the form of those that are ``rewritten``."""
         task = self.task
         for part in blocks(rows):
@@ -83,7 +114,7 @@ class _PointWriter:
                 if task.path.kind[row] == Kind.CIRC:
                     yield from self._via(row, move, int(there[k]), vias[k].tolist(), row in rewritten)
                 elif row in rewritten:
-                    yield Edit(Span(0, *move.head), b"L")
+                    yield Edit(task.place(row, move.head), b"L")
 
     def _numbers(self, point: TpPosition, own: list[float], wanted: list[float]) -> SixNumbers:
         return SixNumbers(own, wanted, self.task.decimals(point))
@@ -94,9 +125,9 @@ class _PointWriter:
         task = self.task
         if rewritten:
             self._check_arc(row, motion)
-            yield Edit(Span(0, *move.head), b"C P[%d]" % self._middle(row, wanted))
+            yield Edit(task.place(row, move.head), b"C P[%d]" % self._middle(row, wanted))
             return
-        via = task.places.points[row][1]
+        via = task.places.middle(row)
         if via is None:
             raise ValueError(f"row {row} has no auxiliary point")
         numbers = self._numbers(via, task.places.vias[row].tolist(), wanted)
@@ -130,18 +161,18 @@ class _PointWriter:
             self.hold(row, why)
         else:
             number = self.points.add(point, changed, named=True)
-            yield Edit(Span(0, *move.points[which].span), b"%d" % number)
+            yield Edit(self.task.place(row, move.points[which].span), b"%d" % number)
 
     def _why_not_in_place(self, point: TpPosition) -> str:
         """Why the numbers of a point cannot be edited; "" where they can."""
         places = self.task.places
         if point.number in places.read or places.any_read:
             return f"other statements read P[{point.number}] too"
-        if places.uses[point.number] > 1:
+        if point.number in places.shared:
             return f"P[{point.number}] is shared by several motions"
         return ""
 
-    def _inserted(self, motions: np.ndarray) -> dict[int, list[bytes]]:
+    def _inserted(self, motions: Ints) -> dict[int, list[bytes]]:
         """Row -> texts of the motions before it, after their line numbers."""
         task = self.task
         lines: dict[int, list[bytes]] = {}
@@ -186,18 +217,21 @@ class _PointWriter:
             return
         before = {int(task.path.line[row]): texts for row, texts in lines.items()}
         count = 1 if task.program.marker is None else 0
-        for one in listing.statements:
-            width = one.number[1] - one.number[0]
-            start = len(BOM_UTF8) if one.line_start == 0 and task.raw.startswith(BOM_UTF8) else one.line_start
-            for text in before.get(one.line, ()):
+        columns = listing.statements.columns()[:, 2:6]
+        for part in blocks(columns):
+            for line, start, first, last in part.tolist():
+                width = last - first
+                if start == 0 and task.raw.startswith(BOM_UTF8):
+                    start = len(BOM_UTF8)
+                for text in before.get(line, ()):
+                    count += 1
+                    number = str(count).rjust(width).encode()
+                    yield Edit(Span(0, start, start), number + b":" + text + document.newline)
+                if first < 0:
+                    continue
                 count += 1
-                number = str(count).rjust(width).encode()
-                yield Edit(Span(0, start, start), number + b":" + text + document.newline)
-            if one.number[0] < 0:
-                continue
-            count += 1
-            if int(task.raw[slice(*one.number)]) != count:
-                yield Edit(Span(0, *one.number), str(count).rjust(width).encode())
+                if int(task.raw[first:last]) != count:
+                    yield Edit(Span(0, first, last), str(count).rjust(width).encode())
         span = listing.attributes.get(b"LINE_COUNT")
         if (
             span is not None
@@ -208,5 +242,5 @@ class _PointWriter:
 
     def hold(self, row: int, why: str, code: str = "FTP015") -> None:
         document = self.task.program.documents[0]
-        place = document.place(self.task.move(row).head[0])
+        place = document.place(self.task.place(row, self.task.move(row).head).start)
         self.held.setdefault(row, Finding(code, why, str(document.path), *place, HELP))

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+
+import numpy as np
+
+from postproc.base.arrays import Ints
 
 _HEAD = re.compile(
     rb"\s*+P[ \t]*+\[[ \t]*+([0-9]{1,9}+)[ \t]*+(:[ \t]*+(?:\"[^\"\r\n]*+\"|[^\]\"\r\n]*+))?+[ \t]*+\]\s*+\{",
@@ -89,9 +94,64 @@ class TpPosition:
         return next((group for group in self.groups if group.number == number), None)
 
 
-def read_positions(raw: bytes, start: int, stop: int) -> tuple[dict[int, TpPosition], list[int]]:
+class TpPositions(Mapping[int, TpPosition]):
+    """The points of a file by their numbers.  Of those in the common form only the place is kept, and they are read
+    again where they are asked for."""
+
+    def __init__(self, raw: bytes) -> None:
+        self._raw = raw
+        self._common: dict[int, int] = {}  # number -> start
+        self._others: dict[int, TpPosition] = {}
+
+    def add(self, one: TpPosition, is_common: bool) -> None:
+        """Takes up a point; one whose number is there already makes that one unknown."""
+        number = one.number
+        known = self.get(number)
+        if known is not None:
+            known.problem = f"P[{number}] is in the file twice"
+            self._common.pop(number, None)
+            self._others[number] = known
+        elif is_common:
+            self._common[number] = one.start
+        else:
+            self._others[number] = one
+
+    def __getitem__(self, number: int) -> TpPosition:
+        start = self._common.get(number)
+        if start is None:
+            return self._others[number]
+        head = _HEAD.match(self._raw, start)
+        if head is None:
+            raise ValueError(f"P[{number}] is no longer where it was")
+        return _position(self._raw, head, len(self._raw))[0]
+
+    def __contains__(self, number: object) -> bool:
+        return number in self._common or number in self._others
+
+    def __iter__(self) -> Iterator[int]:
+        yield from self._common
+        yield from self._others
+
+    def __len__(self) -> int:
+        return len(self._common) + len(self._others)
+
+    def is_common(self, number: int) -> bool:
+        return number in self._common
+
+    def common_spans(self, numbers: list[int]) -> Ints:
+        """(K, 12) starts and stops of X, Y, Z, W, P, R, one after the other, of points (K,) in the common form."""
+        raw, found = self._raw, []
+        for number in numbers:
+            point = COMMON_POINT.match(raw, raw.index(b"{", self._common[number]) + 1)
+            if point is None:
+                raise ValueError(f"P[{number}] is no longer where it was")
+            found.append([at for span in point.regs[4:10] for at in span])
+        return np.array(found, np.int64).reshape(-1, 2 * len(CARTESIAN))
+
+
+def read_positions(raw: bytes, start: int, stop: int) -> tuple[TpPositions, list[int]]:
     """The points between two bytes by their numbers, and where text starts that is no point."""
-    positions: dict[int, TpPosition] = {}
+    positions = TpPositions(raw)
     strange: list[int] = []
     at = start
     while True:
@@ -107,16 +167,13 @@ def read_positions(raw: bytes, start: int, stop: int) -> tuple[dict[int, TpPosit
                 return positions, strange
             at = after.start()
             continue
-        one = _position(raw, head, stop)
+        one, is_common = _position(raw, head, stop)
         at = one.stop
-        known = positions.get(one.number)
-        if known is not None:
-            known.problem = f"P[{one.number}] is in the file twice"
-        else:
-            positions[one.number] = one
+        positions.add(one, is_common)
 
 
-def _position(raw: bytes, head: re.Match[bytes], stop: int) -> TpPosition:
+def _position(raw: bytes, head: re.Match[bytes], stop: int) -> tuple[TpPosition, bool]:
+    """The point that starts with ``head``, and whether it is in the common form."""
     start = head.start() + len(head[0]) - len(head[0].lstrip())
     comment = head.span(2) if head[2] is not None else (head.end(1), head.end(1))
     one = TpPosition(int(head[1]), start, head.end(), head.span(1), comment)
@@ -125,14 +182,14 @@ def _position(raw: bytes, head: re.Match[bytes], stop: int) -> TpPosition:
     if common is not None:
         one.stop = common.end()
         one.groups.append(_common_group(common))
-        return one
+        return one, True
     while True:
         end = _END.match(raw, at, stop)
         if end is not None:
             one.stop = end.end()
             if not one.groups:
                 one.problem = f"P[{one.number}] has no group"
-            return one
+            return one, False
         after = _item(raw, at, stop, one)
         if after < 0:
             one.problem = f"P[{one.number}] is not understood"
@@ -140,7 +197,7 @@ def _position(raw: bytes, head: re.Match[bytes], stop: int) -> TpPosition:
             following = _NEXT.search(raw, at, stop)
             ends = [found for found in (later and later.end(), following and following.start()) if found]
             one.stop = min(ends, default=stop)
-            return one
+            return one, False
         comma = _COMMA.match(raw, after, stop)
         at = after if comma is None else comma.end()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 from postproc.languages.tp.motion_parsing import is_motion_like, parse_motion
 from postproc.languages.tp.tp_listing import NumberedStatement
@@ -98,6 +99,31 @@ _OTHER = re.compile(
 )
 
 
+_PLAIN_HEAD = re.compile(rb"[ \t]*+[JLA][ \t]++P[ \t]*+\[[ \t]*+([0-9]{1,9}+)")
+MOST_KNOWN = 1 << 12
+"""Forms of motions that are kept while a program is read."""
+
+
+def parse_statements(statements: Iterable[NumberedStatement]) -> list[TpStatement]:
+    """What each does; motions that are alike but for the number of their point are the same object."""
+    known: dict[tuple[bytes, int, bytes], TpStatement] = {}
+    parsed = []
+    for one in statements:
+        head = _PLAIN_HEAD.match(one.text)
+        if head is None:
+            parsed.append(parse_statement(one))
+            continue
+        first, last = head.span(1)
+        key = one.text[:first], last, one.text[last:]
+        found = known.get(key)
+        if found is None:
+            found = parse_statement(one)
+            if len(known) < MOST_KNOWN:
+                known[key] = found
+        parsed.append(found)
+    return parsed
+
+
 def parse_statement(statement: NumberedStatement) -> TpStatement:
     """What a numbered statement of /MN does."""
     text = statement.text
@@ -106,7 +132,7 @@ def parse_statement(statement: NumberedStatement) -> TpStatement:
         at = statement.start + remark.start(1)
         shown = text[remark.end() :].decode("latin-1").strip()
         return TpRemark(shown, at, statement.stop)
-    motion = parse_motion(text, statement.start)
+    motion = parse_motion(text)
     if motion is not None:
         return motion
     if is_motion_like(text):

@@ -28,7 +28,7 @@ def arc_runs(rows: TpRows) -> list[list[int]]:
         if move is None or move.form != b"A":
             continue
         last = runs[-1][-1] if runs else -9
-        if last == row - 1 and rows.before[row] == (last,):
+        if last == row - 1 and rows.before(row) == (last,):
             runs[-1].append(row)
         else:
             runs.append([row])
@@ -82,7 +82,7 @@ def _apart(starts: Floats, vias: Floats, ends: Floats) -> np.ndarray:
 
 def _start(rows: TpRows, row: int, kinds: Ints) -> int:
     """The row where an arc starts; -1 where that is not known, which refuses it."""
-    before = rows.before[row]
+    before = rows.before(row)
     if before != (row - 1,) or row == 0 or kinds[row - 1] == Kind.AXIS:
         rows.refuse(row, "FTP012", "the position at its start is not known in numbers")
         return -1

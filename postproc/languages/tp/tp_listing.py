@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 import re
+from array import array
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from postproc.base.arrays import Ints
 
 _SECTION = re.compile(rb"[ \t]*+/(PROG|ATTR|APPL|MN|POS|END)\b", re.I)
 _NUMBER = re.compile(rb"([ \t]*+[0-9]{1,9}+)[ \t]*+:")
@@ -32,7 +39,43 @@ class NumberedStatement:
     closed: bool = False
 
 
-@dataclass(slots=True)
+class NumberedStatements:
+    """The statements of a file in their order, kept as numbers; each is made where it is asked for."""
+
+    def __init__(self, raw: bytes) -> None:
+        self._raw, self._numbers = raw, array("q")
+
+    def __len__(self) -> int:
+        return len(self._numbers) // _COLUMNS
+
+    def __getitem__(self, at: int) -> NumberedStatement:
+        if not 0 <= at < len(self):
+            raise IndexError(at)
+        start, stop, line, line_start, *number, closed = self._numbers[at * _COLUMNS : (at + 1) * _COLUMNS]
+        text = _masked(self._raw, start, stop)
+        return NumberedStatement(start, stop, text, line, line_start, (number[0], number[1]), bool(closed))
+
+    def __iter__(self) -> Iterator[NumberedStatement]:
+        return map(self.__getitem__, range(len(self)))
+
+    def append(self, one: NumberedStatement) -> None:
+        self._numbers.extend((one.start, one.stop, one.line, one.line_start, *one.number, one.closed))
+
+    def pop(self) -> NumberedStatement:
+        """The last one, which is no longer there."""
+        last = self[len(self) - 1]
+        del self._numbers[-_COLUMNS:]
+        return last
+
+    def columns(self) -> Ints:
+        """(K, 7): start, stop, line, line_start, start and stop of the number, closed."""
+        return np.array(self._numbers, np.int64).reshape(-1, _COLUMNS)
+
+
+_COLUMNS = 7
+
+
+@dataclass
 class TpListing:
     """A file.
 
@@ -48,13 +91,16 @@ class TpListing:
     main: int = -1
     points: tuple[int, int] = (-1, -1)
     point_lines: tuple[int, int] = (0, 0)
-    statements: list[NumberedStatement] = field(default_factory=list)
+    statements: NumberedStatements = field(init=False)
     strange: dict[int, bytes] = field(default_factory=dict)
 
-    @property
+    def __post_init__(self) -> None:
+        self.statements = NumberedStatements(self.raw)
+
+    @cached_property
     def count(self) -> int:
-        """Numbered lines of /MN."""
-        return sum(1 for one in self.statements if one.number[0] >= 0)
+        """Numbered lines of /MN, of a file that is read."""
+        return int((self.statements.columns()[:, 4] >= 0).sum())
 
 
 def read_listing(raw: bytes) -> TpListing:
@@ -77,8 +123,6 @@ def read_listing(raw: bytes) -> TpListing:
             if value is not None:
                 listing.attributes.setdefault(value[1].upper(), value.span(2))
         at = stop
-    for one in listing.statements:
-        one.text = _masked(raw, one)
     return listing
 
 
@@ -98,25 +142,26 @@ def _open(listing: TpListing, section: bytes, at: int, stop: int, line: int) -> 
 
 def _main_line(listing: TpListing, at: int, stop: int, line: int) -> None:
     raw = listing.raw
-    last = listing.statements[-1] if listing.statements else None
     found = _NUMBER.match(raw, at, stop)
     if found is not None:
         one = NumberedStatement(found.end(), found.end(), b"", line, at, found.span(1))
-        listing.statements.append(one)
         _extend(raw, one, stop)
+        listing.statements.append(one)
         return
     if not raw[at:stop].strip():
         return
-    if last is not None and not last.closed:
-        _extend(raw, last, stop)
+    if len(listing.statements) and not listing.statements[len(listing.statements) - 1].closed:
+        one = listing.statements.pop()
+        _extend(raw, one, stop)
+        listing.statements.append(one)
         return
     more = _CONTINUED.match(raw, at, stop)
     if more is None:
         listing.strange[at] = raw[at:stop].strip()
         return
     one = NumberedStatement(more.end(), more.end(), b"", line, at, (-1, -1))
-    listing.statements.append(one)
     _extend(raw, one, stop)
+    listing.statements.append(one)
 
 
 def _extend(raw: bytes, one: NumberedStatement, stop: int) -> None:
@@ -128,8 +173,8 @@ def _extend(raw: bytes, one: NumberedStatement, stop: int) -> None:
     one.stop = end - 1 if one.closed else max(end, one.stop)
 
 
-def _masked(raw: bytes, one: NumberedStatement) -> bytes:
-    text = raw[one.start : one.stop]
+def _masked(raw: bytes, start: int, stop: int) -> bytes:
+    text = raw[start:stop]
     if b"\n" not in text:
         return text.replace(b"\r", b" ")
     parts = text.split(b"\n")

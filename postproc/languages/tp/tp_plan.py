@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 from postproc.base.decimals import fixed_one
+from postproc.base.document import Span
 from postproc.base.geometry import abc_from_rotation, rotation_from_vector, turn_between
 from postproc.base.units import DEG, MM
 from postproc.languages.core.plan_rows import ArcLimits, PlanRows
@@ -56,9 +58,14 @@ class TpPlanNumbers(PlanRows):
             raise ValueError(f"row {row} is not understood and cannot be written")
         return move
 
+    def place(self, row: int, span: tuple[int, int]) -> Span:
+        """Of a part of the statement of a row."""
+        start = int(self.places.starts[row])
+        return Span(0, start + span[0], start + span[1])
+
     def point(self, row: int) -> TpPosition:
         """Raises ValueError for a motion without a target in /POS."""
-        point = self.places.points[row][0]
+        point = self.places.target(row)
         if point is None:
             raise ValueError(f"row {row} has no target")
         return point
@@ -98,8 +105,9 @@ class NewPoints:
     def __init__(self, task: TpPlanNumbers) -> None:
         self.task = task
         places = task.places
-        known = (*places.positions, *places.uses, *places.read)
-        self.next = max((number for number in known if number < MOST_POINTS), default=0) + 1
+        used = np.concatenate([places.targets, places.middles, [0]])
+        known = chain([int(used[used < MOST_POINTS].max())], places.positions, places.read)
+        self.next = max(number for number in known if number < MOST_POINTS) + 1
         self.texts: list[bytes] = []
 
     def add(self, source: TpPosition, literals: Mapping[bytes, bytes], named: bool = False) -> int:
@@ -129,6 +137,10 @@ class NewPoints:
                 return None
             literals[name] = fixed_one(there, self.task.least[0])
         return literals
+
+
+def value_and_decimals(literal: bytes) -> tuple[float, int]:
+    return float(literal), _decimals_of(literal)
 
 
 def _decimals_of(literal: bytes) -> int:

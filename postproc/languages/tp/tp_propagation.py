@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
+from typing import NamedTuple
 
 from postproc.languages.tp.statement_flow import END, StatementFlow
 from postproc.languages.tp.tp_statements import (
@@ -45,8 +46,8 @@ Said = TpRemark | Contradictory | None
 @dataclass(frozen=True, slots=True)
 class TpState:
     """``base``, ``tool``: the selected numbers, None where they are not known; ``registers``: number -> value of those
-    that are known; ``displaced``: what displaces targets; ``override``: factor of speeds, None where it is not known;
-    ``last``: statements of the motions after which the robot is here."""
+    that are known; ``displaced``: what displaces targets; ``override``: factor of speeds, None where it is not
+    known."""
 
     base: int | None = None
     tool: int | None = None
@@ -55,7 +56,6 @@ class TpState:
     override: float | None = 1.0
     force: Said = None
     switch: Said = None
-    last: frozenset[int] = frozenset([START])
 
     def joined(self, other: TpState) -> TpState:
         """What holds where two paths meet."""
@@ -69,7 +69,6 @@ class TpState:
             self.override if self.override == other.override else None,
             self.force if self.force == other.force else CONTRADICTORY,
             self.switch if self.switch == other.switch else CONTRADICTORY,
-            self.last | other.last,
         )
 
     def value(self, operand: Operand) -> float | None:
@@ -102,23 +101,42 @@ class TpState:
         return replace(self, registers=tuple(sorted(known.items())))
 
 
+class Reached(NamedTuple):
+    """What holds at a place of the program; ``last``: statements of the motions after which the robot is here."""
+
+    state: TpState
+    last: frozenset[int] = frozenset([START])
+
+    def joined(self, other: Reached) -> Reached:
+        """What holds where two paths meet."""
+        return Reached(self.state.joined(other.state), self.last | other.last)
+
+
+NOWHERE = frozenset([ELSEWHERE])
+
+
 @dataclass(slots=True)
 class TpPropagation:
-    """``before``: statement -> what holds before it, of motions and comments that are run; ``calls``: statement ->
-    program that the file does not contain; ``reads``: statement that reads where the robot is -> motions after which;
-    ``unread``: statements that are not understood."""
+    """``before``: of each statement what holds before it, None where it is not run; ``jumps``: statement -> motions
+    after which it is run, where that is not the statement before it alone; ``calls``: statement -> program that the
+    file does not contain; ``reads``: statement that reads where the robot is -> motions after which; ``unread``:
+    statements that are not understood."""
 
     flow: StatementFlow
-    before: dict[int, TpState] = field(default_factory=dict)
+    before: list[TpState | None] = field(init=False)
+    jumps: dict[int, frozenset[int]] = field(default_factory=dict)
     calls: dict[int, str] = field(default_factory=dict)
     reads: dict[int, frozenset[int]] = field(default_factory=dict)
     unread: set[int] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        self.before = [None] * len(self.flow.statements)
 
     def run(self, state: TpState) -> None:
         """Follows the program from its first statement."""
         if self.flow.problem is not None or not self.flow.blocks:
             return
-        starts: dict[int, TpState] = {0: state}
+        starts = {0: Reached(state)}
         pending = {0}
         while pending:
             block = min(pending)
@@ -132,24 +150,26 @@ class TpPropagation:
         for block in sorted(starts):
             self._through(block, starts[block], True)
 
-    def _through(self, block: int, state: TpState, recording: bool) -> list[tuple[int, TpState]]:
+    def _through(self, block: int, state: Reached, recording: bool) -> list[tuple[int, Reached]]:
         """The blocks that follow one, and what holds there."""
         first, last = self.flow.blocks[block]
         for at in range(first, last):
             one = self.flow.statements[at]
             if recording and isinstance(one, TpMove | TpRemark | StatementNotRead):
-                self.before[at] = state
+                self.before[at] = state.state
+                if len(state.last) != 1 or at - 1 not in state.last:
+                    self.jumps[at] = state.last
             if at == last - 1:
                 return self._leave(at, one, state, recording)
             state = self._step(at, one, state, recording)
         return []
 
-    def _leave(self, at: int, one: TpStatement, state: TpState, recording: bool) -> list[tuple[int, TpState]]:
+    def _leave(self, at: int, one: TpStatement, state: Reached, recording: bool) -> list[tuple[int, Reached]]:
         after = self.flow.after(at)
         states = dict.fromkeys(after, state)
         if isinstance(one, ConditionalStatement):
             done = self._step(at, one.action, state, recording)
-            holds = _decided(one, state)
+            holds = _decided(one, state.state)
             leads = self.flow.targets(one)
             if leads:
                 jumps, follow = set(after[1:]), after[0]
@@ -165,14 +185,22 @@ class TpPropagation:
             states = dict.fromkeys(after, done)
         return [(self.flow.block_at[there], new) for there, new in states.items() if there != END]
 
-    def _step(self, at: int, one: TpStatement, state: TpState, recording: bool) -> TpState:
+    def _step(self, at: int, one: TpStatement, reached: Reached, recording: bool) -> Reached:
+        state, last = reached
+        if isinstance(one, TpMove):
+            # where a displaced or interrupted motion ends is not in the text
+            ends = {ELSEWHERE} if one.problem is not None else {at, ELSEWHERE} if state.displaced else {at}
+            return Reached(state, frozenset(ends))
+        if isinstance(one, StatementNotRead) and one.moves:
+            return Reached(state, frozenset([at]))
+        if isinstance(one, PositionUse) and one.reads_place and recording:
+            self.reads[at] = self.reads.get(at, frozenset()) | last
+        new = self._state_after(at, one, state, recording)
+        return Reached(new, NOWHERE if isinstance(one, ProgramCall | StatementNotRead) else last)
+
+    def _state_after(self, at: int, one: TpStatement, state: TpState, recording: bool) -> TpState:
+        """What holds after a statement that is no motion."""
         match one:
-            case TpMove():
-                # where a displaced or interrupted motion ends is not in the text
-                ends = (
-                    {ELSEWHERE} if one.problem is not None else {at, ELSEWHERE} if state.displaced else {at}
-                )
-                return replace(state, last=frozenset(ends))
             case TpRemark():
                 return _remark(one, state)
             case FrameSelection():
@@ -184,8 +212,6 @@ class TpPropagation:
             case LoopStart():
                 return state.with_register(one.register, None)
             case PositionUse():
-                if one.reads_place and recording:
-                    self.reads[at] = self.reads.get(at, frozenset()) | state.last
                 return state if one.register is None else state.with_register(one.register, None)
             case OverrideStatement():
                 return replace(state, override=None if one.percent is None else one.percent / 100.0)
@@ -195,15 +221,13 @@ class TpPropagation:
             case ProgramCall():
                 if recording:
                     self.calls.setdefault(at, one.name)
-                return replace(state, base=None, tool=None, registers=(), last=frozenset([ELSEWHERE]))
-            case StatementNotRead(moves=True):
-                return replace(state, last=frozenset([at]))
+                return replace(state, base=None, tool=None, registers=())
             case StatementNotRead():
                 if recording:
                     self.unread.add(at)
                 lost = state.displaced | ({b"a statement that is not understood"} if one.displaces else set())
                 state = replace(state, override=None, displaced=frozenset(lost))
-                return replace(state, base=None, tool=None, registers=(), last=frozenset([ELSEWHERE]))
+                return replace(state, base=None, tool=None, registers=())
         return state
 
 

@@ -33,14 +33,14 @@ def annotate(
             if word is None:
                 if one.text and not one.text.startswith(MARK):
                     comments.append(Annotation(row, one.text, line))
-            elif at in run.before:
+            elif run.before[at] is not None:
                 annotations.append(Annotation(row, one.text, line))
                 shown[word[0].upper()] = one
             else:
                 message = f"the comment {one.text[:40]!r} is where no statement is run"
                 findings.append(Finding("FTP016", message, str(document.path), *document.place(one.start)))
-        elif at in rows.row_of:
-            row = rows.row_of[at]
+        elif rows.row_of[at] >= 0:
+            row = int(rows.row_of[at])
             annotations += _repeated(rows, row, shown, document) if isinstance(one, TpMove) else []
             row += 1
     return PlacedRemarks(tuple(annotations), tuple(comments)), findings

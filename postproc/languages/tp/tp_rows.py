@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
-from postproc.base.arrays import Floats
+from postproc.base.arrays import Bools
 from postproc.base.document import Document
 from postproc.languages.tp.position_data import (
     CARTESIAN,
     EXTERNAL,
     JOINTS,
     PositionGroup,
-    TpPosition,
+    TpPositions,
     configuration_flags,
 )
 from postproc.languages.tp.statement_flow import StatementFlow
-from postproc.languages.tp.tp_listing import TpListing
+from postproc.languages.tp.tp_listing import NumberedStatement, TpListing
 from postproc.languages.tp.tp_propagation import CONTRADICTORY, ELSEWHERE, START, TpPropagation, TpState
 from postproc.languages.tp.tp_statements import PositionUse, StatementNotRead, TpMove, TpStatement
 from postproc.toolpath import LOST, FrameRef, Kind
@@ -28,39 +26,65 @@ FARTHEST = 1e7
 """[mm] of a target."""
 
 
-@dataclass(slots=True)
 class TpRows:
     """N rows: numbers (N, 6), vias (N, 6) [mm, deg] as the text has them, axes [deg], external (N, 6) [mm or deg].
 
-    ``at``: statement of each; ``row_of``: statement -> row; ``problems``: row -> code and reason for which it cannot be
-    corrected; ``points``: target and auxiliary point, None where the file does not have it; ``before``: rows after
-    which each runs, START for the start of the program, ELSEWHERE for what it does not contain.
+    ``at`` (N,): statement of each; ``row_of`` (S,): row of each statement, -1 without; ``starts`` (N,): offsets of
+    their texts; ``targets``, ``middles`` (N,): numbers of their points, -1 without; ``states``: what holds before each,
+    None where it is not run; ``problems``: row -> code and reason for which it cannot be corrected; ``jumps``: row ->
+    rows after which it runs, where that is not the row before it alone: START for the start of the program, ELSEWHERE
+    for what it does not contain.
     """
 
-    at: list[int] = field(default_factory=list)
-    moves: list[TpMove | None] = field(default_factory=list)
-    row_of: dict[int, int] = field(default_factory=dict)
-    lines: list[int] = field(default_factory=list)
-    columns: list[int] = field(default_factory=list)
-    kinds: list[int] = field(default_factory=list)
-    points: list[tuple[TpPosition | None, TpPosition | None]] = field(default_factory=list)
-    numbers: Floats = field(default_factory=lambda: np.empty((0, 6)))
-    vias: Floats = field(default_factory=lambda: np.empty((0, 6)))
-    external: Floats = field(default_factory=lambda: np.empty((0, 6)))
-    axes: dict[int, tuple[float, ...]] = field(default_factory=dict)
-    feed: list[float] = field(default_factory=list)
-    base: list[int] = field(default_factory=list)
-    tool: list[int] = field(default_factory=list)
-    nut: list[int] = field(default_factory=list)
-    revolutions: list[int] = field(default_factory=list)
-    before: list[tuple[int, ...]] = field(default_factory=list)
-    states: list[TpState | None] = field(default_factory=list)
-    problems: dict[int, tuple[str, str]] = field(default_factory=dict)
-    frames: list[FrameRef] = field(default_factory=list)
-    assumed: dict[int, str] = field(default_factory=dict)
+    def __init__(self, at: list[int], moves: list[TpMove | None], run: TpPropagation) -> None:
+        n = len(at)
+        self.at, self.moves = np.array(at, np.int64), moves
+        self.row_of = np.full(len(run.before), -1, np.int32)
+        self.row_of[self.at] = np.arange(n)
+        self.states: list[TpState | None] = [run.before[one] for one in at]
+        self.starts = np.empty(n, np.int64)
+        self.lines, self.columns = np.empty(n, np.int32), np.empty(n, np.int32)
+        self.kinds, self.feed = np.full(n, Kind.OTHER, np.int8), np.full(n, np.nan)
+        self.numbers, self.vias = np.full((n, 6), np.nan), np.full((n, 6), np.nan)
+        self.external = np.full((n, 6), np.nan)
+        self.targets, self.middles = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
+        self.base, self.tool = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
+        self.nut, self.revolutions = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
+        self.jumps = self._jumps(run)
+        self.axes: dict[int, tuple[float, ...]] = {}
+        self.problems: dict[int, tuple[str, str]] = {}
+        self.frames: list[FrameRef] = []
+        self.assumed: dict[int, str] = {}
+
+    def _jumps(self, run: TpPropagation) -> dict[int, tuple[int, ...]]:
+        found: dict[int, tuple[int, ...]] = {}
+        for row, (at, state) in enumerate(zip(self.at.tolist(), self.states, strict=True)):
+            last = run.jumps.get(at)
+            if state is None:
+                found[row] = (ELSEWHERE,)
+            elif last is not None:
+                own = {one if one in (START, ELSEWHERE) else int(self.row_of[one]) for one in last}
+                if own != {row - 1}:
+                    found[row] = tuple(sorted(own))
+        return found
 
     def __len__(self) -> int:
         return len(self.at)
+
+    def before(self, row: int) -> tuple[int, ...]:
+        """Rows after which a row runs, as ``jumps`` has them."""
+        return self.jumps.get(row, (row - 1,))
+
+    def continues(self) -> Bools:
+        """(N,) each motion surely starts where the row before it ends, and no other motion starts there."""
+        n = len(self)
+        plain = np.ones(n, np.bool_)
+        plain[list(self.jumps)] = False
+        follow = np.zeros(n + 1, np.int64)  # motions that start where a row ends; the last one: at the start
+        follow[np.arange(-1, n - 1)[plain]] += 1
+        for places in self.jumps.values():
+            follow[[one for one in places if one != ELSEWHERE]] += 1
+        return np.asarray(plain & (follow[np.arange(-1, n - 1)] == 1))
 
     def refuse(self, row: int, code: str, message: str) -> None:
         self.problems.setdefault(row, (code, message))
@@ -80,47 +104,25 @@ class RowBuilder:
     """Puts the motions of a program together."""
 
     def __init__(
-        self, document: Document, listing: TpListing, positions: dict[int, TpPosition], run: TpPropagation
+        self, document: Document, listing: TpListing, positions: TpPositions, run: TpPropagation
     ) -> None:
-        self.document, self.listing, self.positions, self.run = document, listing, positions, run
+        self.document, self.listing, self.positions = document, listing, positions
         self.flow: StatementFlow = run.flow
-        self.rows = TpRows()
+        self.rows = _rows(run)
         self.assigned, self.every_point, self.frames_set = assigned_data(self.flow.statements)
         self._indices: dict[tuple[bool, int], int] = {}
 
     def build(self) -> TpRows:
-        rows = self.rows
-        for at, one in enumerate(self.flow.statements):
-            if isinstance(one, TpMove) or (isinstance(one, StatementNotRead) and one.moves):
-                self._add(at, one if isinstance(one, TpMove) else None)
-        n = len(rows)
-        rows.numbers, rows.vias = np.full((n, 6), np.nan), np.full((n, 6), np.nan)
-        rows.external = np.full((n, 6), np.nan)
-        for row in range(n):
-            self._fill(row)
+        for row, at in enumerate(self.rows.at.tolist()):
+            self._fill(row, self.listing.statements[at])
         self._lose_external()
-        for row in range(n):
-            state = rows.states[row]
-            places = frozenset([ELSEWHERE]) if state is None else state.last
-            own = {at if at in (START, ELSEWHERE) else rows.row_of[at] for at in places}
-            rows.before.append(tuple(sorted(own)))
-        return rows
+        return self.rows
 
-    def _add(self, at: int, move: TpMove | None) -> None:
-        rows, statement = self.rows, self.listing.statements[at]
-        rows.row_of[at] = len(rows)
-        rows.at.append(at)
-        rows.moves.append(move)
-        rows.lines.append(statement.line)
-        rows.columns.append(
-            len(statement.text) - len(statement.text.lstrip()) + statement.start - statement.line_start + 1
-        )
-        rows.states.append(self.run.before.get(at))
-
-    def _fill(self, row: int) -> None:
+    def _fill(self, row: int, statement: NumberedStatement) -> None:
         rows, move, state = self.rows, self.rows.moves[row], self.rows.states[row]
-        kind, feed, base, tool, nut, turns = int(Kind.OTHER), np.nan, -1, -1, -1, -1
-        points: tuple[TpPosition | None, TpPosition | None] = (None, None)
+        text = statement.text
+        rows.starts[row], rows.lines[row] = statement.start, statement.line
+        rows.columns[row] = len(text) - len(text.lstrip()) + statement.start - statement.line_start + 1
         if self.flow.problem is not None:
             rows.refuse(row, "FTP007", "the structure of the program is not understood")
         elif state is None:
@@ -137,38 +139,28 @@ class RowBuilder:
         else:
             if move.problem is not None:
                 rows.refuse(row, *move.problem)
-            kind = int({b"J": Kind.PTP, b"L": Kind.LIN}.get(move.form, Kind.CIRC))
+            numbers = [int(text[slice(*one.span)]) if one.span[0] >= 0 else -1 for one in move.points]
+            rows.targets[row] = numbers[-1]
+            rows.middles[row] = numbers[0] if move.form == b"C" else -1
+            kind = {b"J": Kind.PTP, b"L": Kind.LIN}.get(move.form, Kind.CIRC)
             if (
                 state is not None
                 and move.unit in (b"mm/sec", b"cm/min", b"inch/min")
                 and state.override is not None
             ):
                 speed = state.value(move.value)
-                feed = np.nan if speed is None or not 0 < speed < 1e6 else speed * state.override
-            group = self._target(row, move)
+                if speed is not None and 0 < speed < 1e6:
+                    rows.feed[row] = speed * state.override
+            group = self._target(row, move, numbers[-1])
             if group is not None:
-                base = self._frame(row, group, False, state)
-                tool = self._frame(row, group, True, state)
+                rows.base[row] = self._frame(row, group, False, state)
+                rows.tool[row] = self._frame(row, group, True, state)
                 if group.is_joint and move.form == b"J":
-                    kind = int(Kind.AXIS)
-                nut, turns = self._configuration(row, group, kind)
-            points = self._points(move)
+                    kind = Kind.AXIS
+                rows.nut[row], rows.revolutions[row] = self._configuration(row, group, kind)
             if move.form == b"C":
-                self._via(row, move, group)
-        for values, value in (
-            (rows.kinds, kind),
-            (rows.base, base),
-            (rows.tool, tool),
-            (rows.nut, nut),
-            (rows.revolutions, turns),
-        ):
-            values.append(value)
-        rows.feed.append(float(feed))
-        rows.points.append(points)
-
-    def _points(self, move: TpMove) -> tuple[TpPosition | None, TpPosition | None]:
-        found = [self.positions.get(point.number) for point in move.points]
-        return found[-1], found[0] if move.form == b"C" else None
+                self._via(row, numbers[0], group)
+            rows.kinds[row] = kind
 
     def _group(self, row: int, number: int) -> PositionGroup | None:
         """The first motion group of a point; refuses a row whose point is not known."""
@@ -190,8 +182,8 @@ class RowBuilder:
             return None
         return position.groups[0]
 
-    def _target(self, row: int, move: TpMove) -> PositionGroup | None:
-        rows, number = self.rows, move.points[-1].number
+    def _target(self, row: int, move: TpMove, number: int) -> PositionGroup | None:
+        rows = self.rows
         group = self._group(row, number)
         if group is None:
             return None
@@ -215,8 +207,8 @@ class RowBuilder:
         rows.numbers[row] = numbers
         return group
 
-    def _via(self, row: int, move: TpMove, target: PositionGroup | None) -> None:
-        rows, number = self.rows, move.points[0].number
+    def _via(self, row: int, number: int, target: PositionGroup | None) -> None:
+        rows = self.rows
         group = self._group(row, number)
         if group is None or target is None:
             return
@@ -252,7 +244,7 @@ class RowBuilder:
         key = (is_tool, number)
         if key not in self._indices:
             self._indices[key] = len(rows.frames)
-            rows.frames.append(FrameRef(number, None, rows.lines[row]))
+            rows.frames.append(FrameRef(number, None, int(rows.lines[row])))
         return self._indices[key]
 
     def _configuration(self, row: int, group: PositionGroup, kind: int) -> tuple[int, int]:
@@ -278,7 +270,21 @@ class RowBuilder:
         """An external axis that some points state and others do not is not known at these."""
         external = self.rows.external
         stated = np.isfinite(external).any(axis=0)
-        external[np.isnan(external) & stated] = LOST
+        if stated.any():
+            external[np.isnan(external) & stated] = LOST
+        else:
+            self.rows.external = np.broadcast_to(np.nan, external.shape)
+
+
+def _rows(run: TpPropagation) -> TpRows:
+    """The motions of a program, of which only the order is known."""
+    at: list[int] = []
+    moves: list[TpMove | None] = []
+    for place, one in enumerate(run.flow.statements):
+        if isinstance(one, TpMove) or (isinstance(one, StatementNotRead) and one.moves):
+            at.append(place)
+            moves.append(one if isinstance(one, TpMove) else None)
+    return TpRows(at, moves, run)
 
 
 def assigned_data(statements: list[TpStatement]) -> tuple[set[int], bool, set[tuple[bool, int]]]:
@@ -307,5 +313,5 @@ def read_points(statements: list[TpStatement]) -> tuple[set[int], bool]:
             points |= {number for number in action.read if number is not None}
             computed |= None in action.read
         if isinstance(one, TpMove):
-            computed |= any(point.number < 0 and "computed" in point.reason for point in one.points)
+            computed |= any("computed" in point.reason for point in one.points)
     return points, computed

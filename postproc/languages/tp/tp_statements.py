@@ -27,23 +27,22 @@ class RegisterExpression:
 
 @dataclass(frozen=True, slots=True)
 class PointReference:
-    """A point in a motion.  ``number``: of P[n], -1 for another form, which ``reason`` names then; ``span``: start and
-    stop of the number in the file."""
+    """A point in a motion.  ``span``: start and stop of the number of P[n] in the text of the statement, -1 for another
+    form, which ``reason`` names then."""
 
-    number: int
     span: tuple[int, int]
     reason: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class TpMove:
-    """A motion.
+    """A motion; those that are alike but for the number of their point share one.
 
     ``form``: J, L, C or A; ``points``: its target, before it the auxiliary point of C; ``speed``: text and value with
     its unit; ``termination``: its text; ``corner``: FINE, CNT or CR with its number, None where a register has it;
     ``carried``: options that inserted motions have too; ``own``: it has options that count from its own start;
     ``wrist``: Wjnt; ``problem``: code and reason for which it is not corrected; ``skip``: label to which it may lead.
-    ``head``: start and stop of the letter of its form; ``arguments``: start and stop of what follows its last point.
+    ``head``: start and stop of the letter of its form in the text of the statement.
     """
 
     form: bytes
@@ -59,7 +58,6 @@ class TpMove:
     problem: tuple[str, str] | None
     skip: int | None
     head: tuple[int, int]
-    after_points: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.base.geometry import rotation_from_abc
 from postproc.base.units import DEG, MM
-from postproc.languages.core.row_facts import OTHER_PATHS, follow_on, grouped, moving_external, only_used
+from postproc.languages.core.row_facts import OTHER_PATHS, grouped, moving_external, only_used
 from postproc.languages.tp.tp_arcs import arcs_of
 from postproc.languages.tp.tp_listing import TpListing
 from postproc.languages.tp.tp_propagation import TpPropagation
@@ -34,9 +34,9 @@ def toolpath_of(
     remarks, findings = annotate(document, listing, run, rows)
     position = rows.numbers[:, :3] * MM
     rotation = rotation_from_abc(rows.numbers[:, 5:2:-1] * DEG) if n else np.empty((0, 3, 3))
-    kinds = np.array(rows.kinds, np.int8)
+    kinds = rows.kinds
     arcs, runs = arcs_of(rows, position, rotation, kinds)
-    continues = follow_on(np.zeros(n, np.bool_), range(n), rows.before)
+    continues = rows.continues()
     refused = {row: row_finding(document, rows, row, *rows.problems[row]) for row in sorted(rows.problems)}
     wrist = np.array([move is not None and move.wrist for move in rows.moves], np.bool_)
     path = Toolpath(
@@ -48,10 +48,10 @@ def toolpath_of(
             np.array([rows.axes[row] for row in sorted(rows.axes)]).reshape(-1, 6) * DEG,
             n,
         ),
-        feed=np.array(rows.feed) * MM,
-        base=np.array(rows.base, np.int32),
-        tool=np.array(rows.tool, np.int32),
-        line=np.array(rows.lines, np.int32),
+        feed=rows.feed * MM,
+        base=rows.base,
+        tool=rows.tool,
+        line=rows.lines,
         frames=tuple(rows.frames),
         arcs=arcs,
         constraints=EditConstraints(
@@ -62,15 +62,15 @@ def toolpath_of(
         orientation_control=OrientationControl(
             mode=np.where(wrist, OrientationMode.JOINT, OrientationMode.VAR).astype(np.int8)
         ),
-        configuration=Configuration(
-            {"nut": np.array(rows.nut, np.int32), "revolutions": np.array(rows.revolutions, np.int32)}
-        ),
+        configuration=Configuration({"nut": rows.nut, "revolutions": rows.revolutions}),
         external=rows.external,
         approximation=np.array([rows.approximation(row) for row in range(n)]) * MM,
         stops=np.array([rows.stops(row) for row in range(n)], np.bool_),
         continues=continues,
         predecessors={
-            row: rows.before[row] for row in range(n) if not continues[row] and rows.moves[row] is not None
+            row: rows.before(row)
+            for row in np.flatnonzero(~continues).tolist()
+            if rows.moves[row] is not None
         },
         annotations=remarks.annotations,
         comments=remarks.comments,
@@ -83,7 +83,7 @@ def toolpath_of(
 
 
 def row_finding(document: Document, rows: TpRows, row: int, code: str, message: str) -> Finding:
-    return Finding(code, message, str(document.path), rows.lines[row], rows.columns[row])
+    return Finding(code, message, str(document.path), int(rows.lines[row]), int(rows.columns[row]))
 
 
 def _not_before(rows: TpRows, continues: Bools, refused: Mapping[int, Finding]) -> dict[int, str]:
@@ -130,7 +130,7 @@ def _locked(
         if move is None or move.form not in (b"C", b"A"):
             continue
         others = [one for one in runs.get(row, ()) if one not in rows.problems]
-        for one in (*rows.before[row], *others):
+        for one in (*rows.before(row), *others):
             if one >= 0:
                 lock(
                     one,
@@ -141,5 +141,5 @@ def _locked(
         for place in sorted(places):
             if place >= 0:
                 message = f"line {listing.statements[at].line} reads the end position of this motion"
-                lock(rows.row_of[place], "FTP002", message)
+                lock(int(rows.row_of[place]), "FTP002", message)
     return dict(sorted(locked.items()))
