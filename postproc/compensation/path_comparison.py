@@ -90,7 +90,7 @@ def cuts_not_improved(
     if suspect.any():  # the path before may be worse between its points than there
         some = rows[suspect[place]]
         first = np.maximum(
-            first, largest(_before_between(task, some), np.searchsorted(cuts, result.cut[some]))
+            first, largest(errors_between_as_programmed(task, some), np.searchsorted(cuts, result.cut[some]))
         )
     ends_not_better = (square[0] > square[1] - WORTH**2) & ~(profiled & (after < first - ROUNDING))
     worse = (after > first + ROUNDING) | ends_not_better | turned
@@ -114,7 +114,7 @@ def cuts_not_improved(
     return findings
 
 
-def _before_between(task: CompensationProblem, rows: Ints) -> Floats:
+def errors_between_as_programmed(task: CompensationProblem, rows: Ints) -> Floats:
     """(K,) [m] largest error across the feed inside of the motions ``rows`` (K,) as they are programmed."""
 
     def compare(part: slice) -> Floats:
