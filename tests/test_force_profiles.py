@@ -9,8 +9,11 @@ import pytest
 from path_cases import line
 
 from postproc.compensation.ramped_forces import STEEPEST, add_force_ramps
+from postproc.process import Wrenches
+from postproc.process.force_factors import ForceFactors
 from postproc.process.force_profiles import NEAR, ForceProfiles, reduce_profiles
 from postproc.process.force_ramps import Ramps
+from postproc.process.operation_names import OperationNames
 
 
 def drawn(seed: int, count: int = 6):
@@ -91,6 +94,28 @@ def test_a_profile_of_an_arc_has_places_all_along_it():
         expected = np.interp(found.share[arc], [0, 0.1, 1], profile.wrench[:3, k])
         np.testing.assert_allclose(found.wrench[arc, k], expected)
     assert found.share[~arc].tolist() == [0.0, 1.0]
+
+
+def test_the_factors_of_a_cell_act_on_profiles_too():
+    """A factor of 2, and a turn by 90 deg about the vertical: what lies in the plane turns as a whole."""
+    motion, share, rest, rng = drawn(2)
+    n, extent = 20, np.full(20, 0.1)
+    rest[:, 2:] = 0.0
+    values = np.column_stack([rng.normal(size=(n, 2)), np.zeros((n, 4))])
+    carries = np.ones(n, bool)
+    forces = Wrenches(values, values, carries, "test", (), np.zeros(n, bool))
+    forces = replace(forces, ramps=Ramps.profile(motion, share, rest, extent))
+    names = OperationNames(("TOOL 1",), np.zeros(n, int))
+    base = np.tile(np.eye(3), (n, 1, 1))
+    rows, at = np.repeat(np.arange(n), 7), np.tile(np.linspace(0, 1, 7), n)
+    before = forces.along(rows, at)
+    doubled = ForceFactors({"TOOL 1": 2.0}, {}).acting(forces, names, base)
+    np.testing.assert_allclose(doubled.along(rows, at), 2 * before, atol=1e-9)
+    places = forces.ramps.places()[:2]
+    turned = ForceFactors({}, {"TOOL 1": (0.0, np.pi / 2)}).acting(forces, names, base).along(*places)
+    old = forces.along(*places)
+    np.testing.assert_allclose(np.linalg.norm(turned, axis=1), np.linalg.norm(old, axis=1), atol=1e-9)
+    assert np.abs(np.sum(turned * old, axis=1)).max() < 1e-9
 
 
 def ahead_of(task, row, share):
