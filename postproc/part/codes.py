@@ -19,7 +19,7 @@ CODES = define(
             "part as compensated exceeds the tolerance",
             meaning="Parts of the surface are beyond the tolerance although their motions are corrected.",
             consequence="Where the path turns at once the force steps; the correction follows along a motion.",
-            action="Look at the worst place on the page; round its corner, or begin and end the pass in air.",
+            action="Use a larger corner radius at the worst place on the page, or end the pass in air.",
             example="A row of a ball end mill that ends in the stock with a step aside of 0.6 mm.",
         ),
     }
