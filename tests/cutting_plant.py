@@ -64,6 +64,20 @@ def floor_near(floor, x, y):
 
 
 @njit(cache=True)
+def bite(a, b, m, dphi):
+    """Middle and width of the part of the angles from m dphi to (m + 1) dphi in which the depth, ``a`` and ``b`` at
+    these, is above zero; width 0 where there is none."""
+    first, last = m * dphi, (m + 1) * dphi
+    if a <= 0 and b <= 0:
+        return first, 0.0
+    if a <= 0:
+        first += dphi * a / (a - b)
+    elif b <= 0:
+        last -= dphi * b / (b - a)
+    return 0.5 * (first + last), last - first
+
+
+@njit(cache=True)
 def flat_force(wall, floor, recent, tip, axis, feed, radius, chip, teeth, out):
     """Force and moment about the tip, base axes, of a flat tool; ``recent`` (K, 6) tips and axes of its last places."""
     out[:] = 0.0
@@ -94,17 +108,11 @@ def flat_force(wall, floor, recent, tip, axis, feed, radius, chip, teeth, out):
                     d = min(d, np.sqrt(ox * ox + oy * oy) - radius)
             g[m] = d
         for m in range(angles):
-            a, b = g[m], g[m + 1]
-            if a <= 0 and b <= 0:
+            phi, width = bite(g[m], g[m + 1], m, dphi)
+            if width == 0:
                 continue
-            first, last = m * dphi, (m + 1) * dphi
-            if a <= 0:
-                first += dphi * a / (a - b)
-            elif b <= 0:
-                last -= dphi * b / (b - a)
-            phi = 0.5 * (first + last)
             s, co = np.sin(phi), np.cos(phi)
-            scale = (last - first) * dz * teeth / (2 * np.pi)
+            scale = width * dz * teeth / (2 * np.pi)
             t, r, ax = (
                 (KTC * chip * s + KTE) * scale,
                 (KRC * chip * s + KRE) * scale,
@@ -151,18 +159,12 @@ def ball_force(field, tip, axis, feed, radius, chip, teeth, out):
             d = ball_height(field, p[0], p[1]) - p[2] if p[2] < 0 else -1.0
             g[m] = min(d, radius * (sk * s * v[0] + sk * co * v[1] - ck * v[2]))
         for m in range(angles):
-            a, b = g[m], g[m + 1]
-            if a <= 0 and b <= 0:
+            phi, width = bite(g[m], g[m + 1], m, dphi)
+            if width == 0:
                 continue
-            first, last = m * dphi, (m + 1) * dphi
-            if a <= 0:
-                first += dphi * a / (a - b)
-            elif b <= 0:
-                last -= dphi * b / (b - a)
-            phi = 0.5 * (first + last)
             s, co = np.sin(phi), np.cos(phi)
             h = chip * (sk * s * v[0] + sk * co * v[1] - ck * v[2])
-            scale = (last - first) * radius * dk * teeth / (2 * np.pi)
+            scale = width * radius * dk * teeth / (2 * np.pi)
             t, r, e = (KTC * h + KTE) * scale, (KRC * h + KRE) * scale, (KAC * h + KAE) * scale
             # along the edge, towards the tip: down the meridian
             f[0] = -t * co - r * sk * s - e * ck * s

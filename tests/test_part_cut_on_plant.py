@@ -75,15 +75,18 @@ def test_the_part_as_posted_is_the_one_that_the_machine_cuts(reported):
 
 @pytest.mark.slow
 def test_the_part_as_written_is_the_one_that_the_machine_cuts(reported):
-    """Within some um, but at the rims of the wave; what is left where the force changes along a motion too."""
+    """Within some um, but at the rims of the wave; what is left where the force steps at the ends of its rows too."""
     program, task, part = reported
     machine = cut(task, program.parent / "compensated/part.ngc")
     found = compare(machine, part, part.after)
-    for name, most in (("wall", 5e-3), ("floor", 2e-3), ("wave", 5e-3)):
+    for name, most in (("wall", 5e-3), ("floor", 2e-3), ("wave", 7e-3)):
         error, true = found[name]
         assert np.percentile(np.abs(error - true), 90) < most, name
         assert np.median(np.abs(error - true)) < 3e-3, name
-    # the rows of the wave begin and end where the force turns: the correction does not follow there
+    # where the tool enters and leaves the correction follows
+    for name in ("wall", "floor"):
+        assert np.abs(found[name][1]).max() < 0.06, name
+    # the rows of the wave end in the stock, where the path turns at once: there it takes a motion to follow
     error, true = found["wave"]
     assert true.min() < -0.3
-    assert error.min() == pytest.approx(true.min(), rel=0.05)
+    assert error.min() == pytest.approx(true.min(), rel=0.1)

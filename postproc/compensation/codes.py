@@ -191,5 +191,13 @@ CODES = define(
             action="Use a larger tolerance or min_segment, or a smaller max_growth in the cell.",
             example="tolerance: 0.000001 with max_growth: 1000000.",
         ),
+        "COR024": Code(
+            "info",
+            "force changes inside of motions",
+            meaning="The tool enters, leaves or meets a corner between the end points of motions.",
+            consequence="The figures at the end points do not show the largest error before the correction.",
+            action="Read the path error between the points as written, and the error of the part.",
+            example="A slot from air to air: its end points carry no force, its middle 300 N.",
+        ),
     }
 )

@@ -83,13 +83,17 @@ def cuts_not_improved(
     first = largest(before[rows], place)
     angles = (largest(angle[rows], place) for angle in (result.after_angle, result.before_angle))
     turned = next(angles) > next(angles) + task.tolerance_angle
-    suspect = after > first + ROUNDING
+    profiled = np.zeros(len(cuts), bool)  # their force may act between the points alone
+    if task.force.ramps is not None:
+        profiled[place[np.isin(rows, task.force.ramps.row[task.force.ramps.inside])]] = True
+    suspect = (after > first + ROUNDING) | profiled
     if suspect.any():  # the path before may be worse between its points than there
         some = rows[suspect[place]]
         first = np.maximum(
-            first, largest(_before_between(task, some), np.searchsorted(cuts, result.cut[some]))
+            first, largest(errors_between_as_programmed(task, some), np.searchsorted(cuts, result.cut[some]))
         )
-    worse = (after > first + ROUNDING) | (square[0] > square[1] - WORTH**2) | turned
+    ends_not_better = (square[0] > square[1] - WORTH**2) & ~(profiled & (after < first - ROUNDING))
+    worse = (after > first + ROUNDING) | ends_not_better | turned
     findings = {}
     for k in np.flatnonzero(worse).tolist():
         row = int(rows[np.argmax(place == k)])
@@ -110,7 +114,7 @@ def cuts_not_improved(
     return findings
 
 
-def _before_between(task: CompensationProblem, rows: Ints) -> Floats:
+def errors_between_as_programmed(task: CompensationProblem, rows: Ints) -> Floats:
     """(K,) [m] largest error across the feed inside of the motions ``rows`` (K,) as they are programmed."""
 
     def compare(part: slice) -> Floats:

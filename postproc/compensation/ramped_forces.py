@@ -18,6 +18,7 @@ import numpy as np
 from postproc.base.arrays import Floats, Ints
 from postproc.base.batches import each_block
 from postproc.compensation.problem import CompensationProblem
+from postproc.process.force_ramps import Ramps
 
 ASSUMED = 5e-3
 """[m] Length of a ramp where neither the cell nor the process states it or the cutter's radius."""
@@ -37,6 +38,7 @@ def add_force_ramps(task: CompensationProblem, ramp: Floats | float) -> Compensa
     of the path after it, or along as much more as a correction needs that goes back along the feed (``STEEPEST``)."""
     if task.force.measured:
         return task
+    task = _limit_profiles(task)
     rows = task.force.inner_steps
     known = task.desired_path.traceable[rows] & task.toolpath.known[rows - 1]
     known &= (task.track.status[rows] >= 0) & task.track.reachable[rows] & task.track.reachable[rows - 1]
@@ -52,6 +54,47 @@ def add_force_ramps(task: CompensationProblem, ramp: Floats | float) -> Compensa
     desired_path = task.desired_path
     task = replace(task, force=task.force.ramped(rows, length, desired_path.length), ramp=float(asked.min()))
     vars(task)["desired_path"] = desired_path  # forces change no path
+    return task
+
+
+def _limit_profiles(task: CompensationProblem) -> CompensationProblem:
+    """The task, in which no correction goes back along the feed by more than ``STEEPEST`` where the force changes
+    inside of a motion: of a part that is steeper one of its two places is left out, and the change takes longer."""
+    profiles = task.force.ramps
+    if profiles is None:
+        return task
+    row, share, rest = profiles.places()
+    ahead = np.empty(len(row))
+
+    def look(part: slice) -> None:
+        at, place = row[part], share[part]
+        wanted = task.desired_path.at(at, place)
+        made = task.command(at, wanted, task.force.along(at, place), task.goal(at, wanted, place))
+        shift = made.command.position - wanted.position
+        ahead[part] = np.nan_to_num(np.sum(shift * task.desired_path.tangent(at, place), axis=1))
+
+    each_block(look, len(row))
+    length = task.desired_path.length
+    kept = np.arange(len(row))
+    while True:
+        here = row[kept]
+        inner = np.append(here[1:] == here[:-1], False)
+        gain = np.append(np.diff(ahead[kept]), 0.0) + STEEPEST * length[here] * np.append(
+            np.diff(share[kept]), 0.0
+        )
+        steep = np.flatnonzero(inner & (gain < -SAME))
+        # the place after the part, but the end of a motion stays
+        out = np.where(share[kept[steep + 1]] < 1.0, steep + 1, steep)
+        out = out[share[kept[out]] > 0.0]
+        if not len(out):
+            break
+        kept = np.delete(kept, out)
+    if len(kept) == len(row):
+        return task
+    ramps = Ramps.profile(row[kept], share[kept], rest[kept], length)
+    desired_path = task.desired_path
+    task = replace(task, force=replace(task.force, ramps=ramps))
+    vars(task)["desired_path"] = desired_path
     return task
 
 

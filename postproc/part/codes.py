@@ -18,9 +18,9 @@ CODES = define(
             "warning",
             "part as compensated exceeds the tolerance",
             meaning="Parts of the surface are beyond the tolerance although their motions are corrected.",
-            consequence="A correction is even along a motion; at entries, exits and corners the force is not.",
-            action="Look at the worst place on the page; divide its motion where the tool enters, leaves or turns.",
-            example="A pass that is corrected by 0.4 mm, and leaves the blank, and with it the force, before its end.",
+            consequence="Where the path turns at once the force steps; the correction follows along a motion.",
+            action="Use a larger corner radius at the worst place on the page, or end the pass in air.",
+            example="A row of a ball end mill that ends in the stock with a step aside of 0.6 mm.",
         ),
     }
 )

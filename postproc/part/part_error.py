@@ -124,6 +124,10 @@ def _cut_forces(task: CompensationProblem, nominal: _Nominal, solved: CoupledEng
     """The forces of a side against those of the nominal engagement."""
     motions = np.unique(nominal.paths.motion)
     ends = [task.force.along(motions, np.full(len(motions), share)) for share in (0.0, 1.0)]
+    if task.force.ramps is not None:
+        row, share = task.force.ramps.ends()
+        near = np.isin(row, motions)
+        ends.append(task.force.along(row[near], share[near]))
     largest = float(lengths(np.concatenate(ends)[:, :3]).max(initial=0.0))
     if isinstance(solved, str):
         return CutForces(solved, largest, None, None)

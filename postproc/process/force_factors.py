@@ -7,8 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from postproc.base.arrays import Floats
+from postproc.base.arrays import Floats, Ints
 from postproc.base.geometry import rotation_from_vector, turned
+from postproc.process.force_ramps import Ramps
 from postproc.process.operation_names import OperationNames
 from postproc.process.wrenches import Wrenches
 
@@ -31,17 +32,33 @@ class ForceFactors:
         rows = np.arange(count)
         scale = np.array([self.factor.get(name, self.common) for name in operations.names])[operations.which]
         turns = np.array([self.turn.get(name, (0.0, 0.0)) for name in operations.names])[operations.which]
-        ends = []
-        for side in (forces.values[rows], forces.start[rows]):
-            moved = side * scale[:, None]
-            first, second = axes_across(side[:, :3], base)
-            rotation = rotation_from_vector(turns[:, :1] * first + turns[:, 1:] * second)
+
+        def act(wrench: Floats, at: Ints) -> Floats:
+            """(K, 6) ``wrench`` (K, 6) of the motions ``at`` (K,)."""
+            moved = wrench * scale[at, None]
+            first, second = axes_across(wrench[:, :3], base[at])
+            rotation = rotation_from_vector(turns[at, :1] * first + turns[at, 1:] * second)
             moved[:, :3] = turned(rotation, moved[:, :3])
-            ends.append(moved)
+            return np.asarray(moved)
+
         known = np.array([self.ci95.get(name, np.nan) for name in operations.names])[operations.which]
         if forces.ci95 is not None:
             known = np.where(np.isnan(known), forces.ci95, known)
-        return replace(forces, values=ends[0], start=ends[1], ci95=None if np.isnan(known).all() else known)
+        acting = replace(
+            forces,
+            values=act(forces.values[rows], rows),
+            start=act(forces.start[rows], rows),
+            ci95=None if np.isnan(known).all() else known,
+            ramps=None,
+        )
+        if forces.ramps is None:
+            return acting
+        at, share, _ = forces.ramps.places()
+        rest = act(forces.along(at, share), at) - acting.along(at, share)
+        rest[(share == 0.0) | (share == 1.0)] = 0.0
+        extent = np.zeros(count)
+        extent[forces.ramps.row] = forces.ramps.extent
+        return replace(acting, ramps=Ramps.profile(at, share, rest, extent))
 
 
 def axes_across(force: Floats, axes: Floats) -> tuple[Floats, Floats]:

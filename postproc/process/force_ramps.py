@@ -6,12 +6,13 @@ at the vertex where a motion starts acts, at the path length s after that vertex
     w(s) = w_new(s) - dw max(0, 1 - s / r)
 
 so that the motion before keeps its own force up to the vertex, and the new one is whole at s = r.  Steps that lie
-nearer to each other than r add up.
+nearer to each other than r add up.  Where the force changes inside of a motion, as at entries and exits, parts of the
+same form add up to its profile.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -23,7 +24,8 @@ class Ramps:
     """E parts of ramps, one for each motion that a ramp leads over, ascending by motion.
 
     row (E,): the motion; start (E,) [m]: path length from the step to where the motion starts; extent (E,) [m]: length
-    of the motion; length (E,) [m]: of the whole ramp, > 0; step (E, 6) [N, N m]: new minus old wrench, robot base axes.
+    of the motion; length (E,) [m]: of the whole ramp, > 0; step (E, 6) [N, N m]: new minus old wrench, robot base axes;
+    inside (E,): part of the profile of its motion, no step.
     """
 
     row: Ints
@@ -31,6 +33,7 @@ class Ramps:
     extent: Floats
     length: Floats
     step: Floats
+    inside: Bools
 
     @staticmethod
     def of(rows: Ints, step: Floats, length: Floats, extent: Floats, carries: Bools) -> Ramps:
@@ -54,7 +57,49 @@ class Ramps:
             extent[row[order]],
             np.repeat(length, count)[order],
             np.repeat(step, count, axis=0)[order],
+            np.zeros(len(row), bool),
         )
+
+    @staticmethod
+    def profile(row: Ints, share: Floats, rest: Floats, extent: Floats) -> Ramps:
+        """Ramps that add up to the wrenches ``rest`` (P, 6) at the shares ``share`` (P,) of the motions ``row`` (P,),
+        straight in between; ascending, from 0 to 1 in each motion, 0 at both ends.  extent (N,) [m]: of all motions.
+
+        A function with the slopes m_1 .. m_k between s_0 = 0, s_1 .. s_k = 1 that ends at 0 is the sum of
+        (m_(i+1) - m_i) s_i max(0, 1 - s / s_i), with m_(k+1) = 0.
+        """
+        same = row[1:] == row[:-1]
+        apart = np.where(same, np.diff(share), 1.0)
+        slope = np.where(same[:, None], np.diff(rest, axis=0) / np.maximum(apart, 1e-12)[:, None], 0.0)
+        before, after = np.vstack([np.zeros(6), slope]), np.vstack([slope, np.zeros(6)])
+        knot = share > 0
+        row, share = row[knot], share[knot]
+        length = share * extent[row]
+        step = share[:, None] * (before - after)[knot]
+        some = length > 0
+        return Ramps(
+            row[some],
+            np.zeros(int(some.sum())),
+            extent[row][some],
+            length[some],
+            step[some],
+            np.ones(int(some.sum()), bool),
+        )
+
+    def places(self) -> tuple[Ints, Floats, Floats]:
+        """Of profiles: the motions (P,), shares (P,) and wrenches (P, 6) that they were made of (see ``profile``)."""
+        motions = np.unique(self.row)
+        row = np.concatenate([self.row, motions])
+        share = np.concatenate([self.length / self.extent, np.zeros(len(motions))])
+        order = np.lexsort((share, row))
+        row, share = row[order], share[order]
+        return row, share, self.at(row, share)
+
+    def joined(self, other: Ramps) -> Ramps:
+        """Both, in their order."""
+        order = np.argsort(np.concatenate([self.row, other.row]), kind="stable")
+        pairs = ((getattr(self, one.name), getattr(other, one.name)) for one in fields(self))
+        return Ramps(*(np.concatenate(pair)[order] for pair in pairs))
 
     def at(self, rows: Ints, share: Floats) -> Floats:
         """(K, 6) what the ramps add to the new wrench at the shares ``share`` (K,) of the motions ``rows`` (K,)."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints, frozen
 from postproc.base.findings import nearest
+from postproc.process.force_profiles import ForceProfiles
 
 LARGEST = 1e9
 """[N, N m] No force is larger."""
@@ -35,7 +36,8 @@ class StatedForces:
     in between.  Of the motions: ``ci95`` (N,), half width of the 95 % interval of the force as a share of it; ``peak``
     (N,) [N], the largest force along the path.  NaN where not known, None where known of no motion.  ``error`` (N,)
     [N]: standard error of the force at the ends, where it was measured.  ``radius`` (N,) [m]: of the cutter, where the
-    process states it.  ``stock``: the ``StockRun`` that they were computed in, if any; its type needs numba.
+    process states it.  ``profiles``: of motions along which the force is not linear, in their frames.  ``stock``: the
+    ``StockRun`` that they were computed in, if any; its type needs numba.
     """
 
     values: Floats
@@ -46,6 +48,7 @@ class StatedForces:
     peak: Floats | None = None
     error: Floats | None = None
     radius: Floats | None = None
+    profiles: ForceProfiles | None = None
     stock: object = None
 
     def __post_init__(self) -> None:
@@ -79,16 +82,20 @@ class StatedForces:
 
     @property
     def acts(self) -> Bools:
-        """(N,) the motion has a force or a moment at either end."""
+        """(N,) the motion has a force or a moment on its path."""
         return self.any(range(6))
 
     def any(self, channels: Sequence[int]) -> Bools:
-        """(N,) the motion has a part in one of the ``channels`` at either end."""
+        """(N,) the motion has a part in one of the ``channels`` on its path."""
         acts = np.zeros(len(self.values), bool)
         for wrenches in (self.values, self.start_values):
             for channel in channels:
                 acts |= wrenches[:, channel] != 0
-        return acts[self.row]
+        found = acts[self.row]
+        if self.profiles is not None:
+            inside = (self.profiles.wrench[:, list(channels)] != 0).any(axis=1)
+            found[self.profiles.motion[inside]] = True
+        return found
 
 
 class NotAForce(ValueError):

@@ -13,8 +13,10 @@ from postproc.base.arrays import Bools, FewRows, Floats, Ints, frozen, is_shared
 from postproc.base.batches import blocks, in_blocks
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import lengths, turn_beside, turning
+from postproc.base.units import DEG
 from postproc.cell import Cell, MotionFrames
 from postproc.process.feed_frames import FeedFrames
+from postproc.process.force_profiles import ForceProfiles
 from postproc.process.force_ramps import Ramps
 from postproc.process.path_length import SMOOTH_TURN, MotionRuns, PathLength
 from postproc.process.stated_forces import BASE, FEED, TOOL, WORLD, StatedForces
@@ -28,6 +30,9 @@ JUMP = float(2 * np.sin(SMOOTH_TURN / 2))
 
 JUMP_OF_LARGEST = 0.05
 """Changes below this share of the program's largest force are no steps."""
+
+STRAIGHT = 15 * DEG
+"""Along an arc that turns by less a profile is straight in the axes of the robot."""
 
 CLEAR = 4.0
 """A measured force jumps where it does by more than so many of its standard errors."""
@@ -86,11 +91,14 @@ class Wrenches:
 
     @cached_property
     def max_force(self) -> float:
-        """The largest force [N] at either end of any motion."""
+        """The largest force [N] at either end of any motion, and where its profile bends."""
         if not self.any:
             return 0.0
         sides = (self.values, self.start)
-        return float(np.sqrt(max(_largest(side[rows]) for side in sides for rows in blocks(len(self)))))
+        largest = max(_largest(side[rows]) for side in sides for rows in blocks(len(self)))
+        if self.ramps is not None:
+            largest = max(largest, _largest(self.along(*self.ramps.ends())))
+        return float(np.sqrt(largest))
 
     @property
     def peak_force(self) -> float:
@@ -121,9 +129,8 @@ class Wrenches:
         step = self.start[rows] - self.values[rows - 1]
         steps = self.steps.copy()
         steps[rows] = False
-        return replace(
-            self, steps=steps, ramps=Ramps.of(rows, step, length, extent, np.asarray(self.carries))
-        )
+        ramps = Ramps.of(rows, step, length, extent, np.asarray(self.carries))
+        return replace(self, steps=steps, ramps=ramps if self.ramps is None else self.ramps.joined(ramps))
 
     def along(self, rows: Ints, fraction: Floats) -> Floats:
         """(K, 6) the wrench at the shares ``fraction`` (K,), 0 to 1, of the path of the motions ``rows`` (K,).
@@ -275,7 +282,7 @@ def turn_to_robot_axes(
         pass
     for array in (values, start, steps):
         array.setflags(write=False)
-    return Wrenches(
+    wrenches = Wrenches(
         values,
         start,
         carries,
@@ -292,6 +299,26 @@ def turn_to_robot_axes(
         else frozen(feed.undirected, None, np.bool_),
         stock=stated.stock,
     )
+    if stated.profiles is None:
+        return wrenches
+    return replace(wrenches, ramps=_profile_ramps(stated.profiles, wrenches, turn, path_length))
+
+
+def _profile_ramps(
+    profiles: ForceProfiles, wrenches: Wrenches, turn: _WrenchTurning, path_length: PathLength
+) -> Ramps | None:
+    """What the profiles of motions add to their forces, which are linear between their ends."""
+    known = wrenches.carries & path_length.starts & path_length.known & (path_length.length > 0)
+    if turn.feed is not None:
+        known &= ~turn.feed.undirected
+    turns = np.where(path_length.arc, np.nan_to_num(path_length.sweep), 0.0)
+    profiles = profiles.of(known).divided(turns, STRAIGHT)
+    rows, share, wrench = profiles.motion, profiles.share, profiles.wrench
+    if not len(rows):
+        return None
+    rest = turn.along(rows, share, wrench) - wrenches.along(rows, share)
+    rest[(share == 0.0) | (share == 1.0)] = 0.0  # there the vertex decides
+    return Ramps.profile(rows, share, rest, path_length.length)
 
 
 def _check_world(
@@ -361,6 +388,15 @@ class _WrenchTurning:
         own = self.stated.of(values, rows)
         wrench = self._base(own.reshape(-1, 2, 3), rows, 1).reshape(-1, 6)
         return np.where(np.isnan(wrench), own, wrench)
+
+    def along(self, rows: Ints, share: Floats, wrench: Floats) -> Floats:
+        """(K, 6) ``wrench`` (K, 6), stated at the shares ``share`` (K,) of the motions ``rows`` (K,)."""
+        own = wrench.reshape(-1, 2, 3)
+        turned = self._base(own, rows, 1)
+        across = self.stated.frames[rows] == FEED
+        if self.feed is not None and across.any():
+            turned[across] = own[across] @ self.feed.along(rows[across], share[across])
+        return np.asarray(turned.reshape(-1, 6))
 
     def turning(self, carries: Bools) -> Turning | None:
         """The frames that turn along the path of arcs, where there are any."""

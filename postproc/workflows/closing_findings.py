@@ -7,6 +7,7 @@ import numpy as np
 from postproc.base import rotary_words
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
+from postproc.compensation.path_comparison import errors_between_as_programmed
 from postproc.compensation.splines import unknown_displacements
 from postproc.compensation.subdivision import Subdivision
 from postproc.output.write import (
@@ -55,8 +56,28 @@ def closing_findings(request: Request, ready: Prepared, written: WrittenProgram)
             help = _POLE if unit == DEG and _by_pair(path, row) else ""
             findings.append(Finding("COR005", message, file, int(path.line[row]), help=help))
     findings += _between(request, ready, written) + _not_turned(ready, written)
+    findings += _changing_forces(ready, written)
     findings += _started(ready, written)
     return findings + _splines(ready, written) + _assumed(request, ready, written)
+
+
+def _changing_forces(ready: Prepared, written: WrittenProgram) -> list[Finding]:
+    """Where the force changes inside of motions, and the tool is further off than at their end points."""
+    task = ready.task
+    if task.force.ramps is None or not task.force.ramps.inside.any():
+        return []
+    rows = np.unique(task.force.ramps.row[task.force.ramps.inside])
+    off = errors_between_as_programmed(task, rows)
+    at_ends = float(np.nanmax(written.across_before[written.result.scope], initial=0.0))
+    worst = int(np.argmax(off))
+    if not off[worst] > at_ends:
+        return []
+    message = (
+        f"the force changes inside of {len(rows)} motions: between the end points the uncorrected tool is up to"
+        f" {off[worst] / MM:.4f} mm off across the feed (worst here), at them up to {at_ends / MM:.4f}; the uncertainty"
+        " between them is larger in the same proportion"
+    )
+    return [Finding("COR024", message, task.file, int(task.toolpath.line[rows[worst]]))]
 
 
 def _started(ready: Prepared, written: WrittenProgram) -> list[Finding]:

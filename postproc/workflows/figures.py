@@ -101,7 +101,7 @@ def _path_figures(
     beside = np.where(result.corrected, result.across_after, across)[rows]
     ahead = np.sqrt(np.maximum(result.after[rows] ** 2 - beside**2, 0.0))
     ramps = task.force.ramps
-    starts = rows[:0] if ramps is None else np.flatnonzero(ramps.start == 0.0)
+    starts = rows[:0] if ramps is None else np.flatnonzero((ramps.start == 0.0) & ~ramps.inside)
     longest, line = math.nan, 0
     if ramps is not None and len(starts):
         most = starts[np.argmax(ramps.length[starts])]

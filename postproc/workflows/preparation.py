@@ -20,7 +20,7 @@ from postproc.cell import Cell, MotionFrames, find_cell, frames_of, load_cell, n
 from postproc.compensation.known_error import KnownError
 from postproc.compensation.lost_motion import add_lost_motion
 from postproc.compensation.problem import CompensationProblem
-from postproc.compensation.ramped_forces import ASSUMED, add_force_ramps
+from postproc.compensation.ramped_forces import add_force_ramps
 from postproc.effects import Conditions
 from postproc.languages import DIALECTS, detect
 from postproc.languages.dialect import Dialect, Program, ReadingSettings, read_with_siblings
@@ -41,6 +41,7 @@ from postproc.toolpath import Toolpath
 from postproc.workflows.cell_force_factors import factored
 from postproc.workflows.cell_tool_errors import cell_tool_displacement
 from postproc.workflows.correction_mode import corrected_model, mode_findings, temperature_rise, touch_off
+from postproc.workflows.ramp_lengths import ramp_lengths
 from postproc.workflows.reading_findings import configuration_findings, reader_findings
 
 Stage = Callable[[str], None]
@@ -256,7 +257,7 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
         external=external,
         known_error=None if learned is None else learned.known_error,
     )
-    task = add_force_ramps(task, _ramp(cell, path, force))
+    task = add_force_ramps(task, ramp_lengths(cell, path, force))
     spacing = np.maximum(cell.min_segment, 1e-3 * cell.cycle_ms * np.nan_to_num(path.feed))
     task = add_lost_motion(task, start, spacing)
     tool_findings: tuple[Finding, ...] = ()
@@ -336,24 +337,6 @@ def _conditions(
         payload_mass=mass,
         payload_com=com,
     )
-
-
-def _ramp(cell: Cell, path: Toolpath, force: Wrenches) -> Floats:
-    """(N,) [m] path over which a force that steps inside a cut goes over: as the cell states, or the cutter's radius
-    where the process or the cell's tool states it."""
-    if cell.force_ramp is not None:
-        return np.broadcast_to(cell.force_ramp, (len(path),))
-    radius = np.full(len(path.frames) + 1, np.nan)  # the last is for an unknown tool
-    for index, frame in enumerate(path.frames):
-        tool = cell.tools.get(frame.number or 0)
-        if tool is not None and tool.diameter is not None:
-            radius[index] = 0.5 * tool.diameter
-    if force.radius is None and np.isnan(radius).all():
-        return np.broadcast_to(ASSUMED, (len(path),))
-    ramp = radius[path.tool]
-    if force.radius is not None:
-        ramp = np.where(np.isnan(force.radius), ramp, force.radius)
-    return np.where(np.isnan(ramp), ASSUMED, ramp)
 
 
 def _missing_points(program: Program, force: Wrenches) -> None:

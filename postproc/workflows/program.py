@@ -18,7 +18,6 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import place
 from postproc.base.memory import release_free_memory
 from postproc.base.paged_memory import large_arrays_in_files
-from postproc.base.units import MM
 from postproc.compensation.axis_limits import check_limits
 from postproc.compensation.corner_fit import corners_not_improved, fit_corners
 from postproc.compensation.correct import MotionOutcome, correct
@@ -47,10 +46,15 @@ from postproc.report.report import Report, in_order_of_place, json_bytes
 from postproc.workflows.closing_findings import closing_findings
 from postproc.workflows.figures import report_of
 from postproc.workflows.part import part_error_of
-from postproc.workflows.preparation import Prepared, Request, Stage, completed, prepare, silent
-
-NEAREST = 0.3 * MM
-"""[m] Distance of a point that ends a ramp from the next, where the cell does not say how short a motion may be."""
+from postproc.workflows.preparation import (
+    Prepared,
+    Request,
+    Stage,
+    completed,
+    prepare,
+    silent,
+)
+from postproc.workflows.ramp_lengths import nearest_point
 
 LEAST = 200
 """Motions that may be inserted into any program where the cell does not limit its growth: a controller holds them."""
@@ -267,7 +271,7 @@ def _corrected(
         cell.max_growth,
         1e-3 * cell.cycle_ms,
         0 if cell.growth_stated else LEAST,
-        cell.min_segment if cell.segment_stated else NEAREST,
+        nearest_point(cell),
     )
     writing = writing_settings(cell, request.shared_points)
     while True:

@@ -10,6 +10,7 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import each_block
 from postproc.base.units import MM
+from postproc.process.force_profiles import ForceProfiles
 from postproc.process.stock.blank import Blank
 from postproc.process.stock.cells import Stock, build_stock
 from postproc.process.stock.chains import chain_contacts
@@ -30,6 +31,7 @@ from postproc.process.stock.contact import (
 from postproc.process.stock.cutters import CUTTING, HOLDER, SHANK, Cutter
 from postproc.process.stock.distance import AXIS, CUTTER, REMOVES, STEP, TIP_POINT
 from postproc.process.stock.motion_sweeps import MotionSweeps
+from postproc.process.stock.profile_places import profiles_of_places
 from postproc.process.stock.saved_stock import Removed
 from postproc.process.stock.stock_section import Edges
 from postproc.toolpath import Toolpath
@@ -45,6 +47,9 @@ ALIKE = 0.02
 
 _STEP, _HALVINGS = 0.2, 8
 """Of two places of such a sweep one removes less than this share of the other: where it steps is halved so often."""
+
+_AT_START = 1e-2
+"""Radii of the cutter: so near to the start of a sweep it is looked at."""
 
 LEAST_AREA = 1e-5 * MM**2
 """Across the feed: below it nothing is cut."""
@@ -63,7 +68,8 @@ class EngagedMotions:
     cuts (N,); volume (N,) [m3] that is removed; mean (N, 6) and largest (N, 6) wrench [N, N m] along the motion, its
     moments about the tip, NaN where feed, teeth, spindle or material are not known; where the force, or without one the
     removed area, is largest: depth (axial), width (across the feed) [m], entry and exit [rad], chip [m]; along (N,
-    2, 6): wrench at start and end of a line through the motion; power (N,) [W], the mean; speed (N,) [rad/s].
+    2, 6): wrench at start and end of a line through the motion; profiles: of the motions along which it changes;
+    power (N,) [W], the mean; speed (N,) [rad/s].
     hits: row of a motion -> the parts that collide; uneven (U,): sweeps along which the removed area changes.
     """
 
@@ -72,6 +78,7 @@ class EngagedMotions:
     mean: Floats
     largest: Floats
     along: Floats
+    profiles: ForceProfiles
     depth: Floats
     width: Floats
     entry: Floats
@@ -141,7 +148,14 @@ def engage(
     hits = _hits(stock, sweeps, profiles, heading, live, earlier, radius)
     speed = speeds_of(sweeps, toolpath, edges)
     cut = _by_motion(len(toolpath), sweeps, sweep, weight, found, laws, speed, hits, stock)
-    return replace(cut, uneven=uneven)
+    changing = np.isin(sweeps.motion[sweep], sweeps.motion[uneven])
+    forces = profiles_of_places(sweeps, sweep[changing], weight[changing], found[changing, FORCE : FORCE + 6])
+    along = cut.along.copy()
+    known = ~np.isnan(cut.mean[forces.motion, 0])
+    for side, share in enumerate((0.0, 1.0)):
+        at = np.flatnonzero(known & (forces.share == share))
+        along[forces.motion[at], side] = forces.wrench[at]
+    return replace(cut, along=along, profiles=forces.bent(), uneven=uneven)
 
 
 def profiles_of(cutters: tuple[Cutter, ...]) -> Floats:
@@ -226,7 +240,9 @@ def _look_closer(
     sweep, share, weight = _places(sweeps, radius, uneven, FINER)
     nothing = np.zeros(len(uneven))
     sweep = np.concatenate([sweep, uneven, uneven])
-    share = np.concatenate([share, nothing, nothing + 1])
+    # right at its start a tool touches just what the motion before left
+    start = np.minimum(_AT_START * radius[uneven] / np.maximum(sweeps.length[uneven], 1e-9), 0.01)
+    share = np.concatenate([share, start, nothing + 1])
     order = np.lexsort((share, sweep))
     sweep, share, weight = sweep[order], share[order], np.concatenate([weight, nothing, nothing])[order]
     found = look(sweep, share)
@@ -337,6 +353,7 @@ def _by_motion(
         mean=mean,
         largest=largest,
         along=_lines(count, motion[touches], wrench[touches]),
+        profiles=ForceProfiles.none(),
         depth=np.where(cuts, table[:, HIGH] - np.maximum(table[:, LOW], 0.0), 0.0),
         width=np.where(cuts, table[:, LEFT] - table[:, RIGHT], 0.0),
         entry=table[:, ENTRY],

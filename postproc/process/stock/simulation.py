@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.findings import Finding, Refusal
 from postproc.base.units import MM
 from postproc.cell import MotionFrames
+from postproc.process.force_profiles import ForceProfiles
 from postproc.process.stated_forces import BASE, FEED, StatedForces
 from postproc.process.stock.blank import Blank, box_blank, corners_of, cylinder_blank, mesh_blank
 from postproc.process.stock.cutters import CUTTING, HOLDER, SHANK
@@ -122,6 +123,7 @@ def stock_forces(
     )
     index = np.zeros(len(toolpath), np.int32)
     index[rows] = 1 + np.arange(len(rows))
+    profiles = _framed(cut.profiles, rows[plunges], turned)
     nothing = np.zeros((1, 6))
     radius = np.full(len(toolpath), np.nan)
     numbers = np.array([cutter.radius for cutter in run.sweeps.cutters])
@@ -136,9 +138,19 @@ def stock_forces(
         ci95=run.ci95,
         peak=peak,
         radius=radius,
+        profiles=profiles if len(profiles.motion) else None,
         stock=run,
     )
     return stated, (*_summaries(run, toolpath, path), *run.findings)
+
+
+def _framed(profiles: ForceProfiles, plunges: Ints, turned: Floats) -> ForceProfiles:
+    """The profiles, those of ``plunges`` (K,) turned by ``turned`` (K, 3, 3) into their base."""
+    wrench = profiles.wrench.copy()
+    at = np.flatnonzero(np.isin(profiles.motion, plunges))
+    turns = turned[np.searchsorted(plunges, profiles.motion[at])]
+    wrench[at] = np.einsum("nij,nkj->nki", turns, wrench[at].reshape(-1, 2, 3)).reshape(-1, 6)
+    return replace(profiles, wrench=wrench)
 
 
 def _along_spindle(sweeps: MotionSweeps, count: int) -> Bools:
