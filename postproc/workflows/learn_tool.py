@@ -91,9 +91,9 @@ def tool_and_base_findings(result: Attribution, file: str, lines: str) -> list[F
         if abs(total) * MM <= deviation or not is_observed(cause, value, deviation):
             continue
         more = {"radius": ("larger", "smaller"), "length": ("longer", "shorter")}[cause.parameter][total < 0]
-        word = "is" if abs(total) > width else "is probably"
-        message = f"{cause.place} {word} {more} than programmed by {abs(total):.3f} +- {width:.3f} mm"
-        message += f" ({cause.parameter})"
+        word = "" if abs(total) > width else "probably "
+        size = f"{abs(total):.3f} +- {width:.3f} mm ({cause.parameter})"
+        message = f"{cause.place} is {word}{more} than programmed by {size}"
         help = f"measure it and set it in control and CAM, or add the lines of {lines} to the cell; not both"
         findings.append(Finding("LRN018", message, file, help=help))
     for cause, value, deviation in _measured(result, "base"):
@@ -102,9 +102,9 @@ def tool_and_base_findings(result: Attribution, file: str, lines: str) -> list[F
         turn = cause.unit == "rad"
         unit, name = (DEG, "deg") if turn else (MM, "mm")
         axis, digits = _BASE_AXES[cause.parameter], 4 if turn else 3
-        word = "was" if abs(value) > COVERAGE * deviation else "was probably"
-        message = f"the part {word} cut {'turned about' if turn else 'shifted along'} {axis} of its base by"
-        message += f" {value / unit:+.{digits}f} +- {COVERAGE * deviation / unit:.{digits}f} {name}"
+        word = "" if abs(value) > COVERAGE * deviation else "probably "
+        size = f"{value / unit:+.{digits}f} +- {COVERAGE * deviation / unit:.{digits}f} {name}"
+        message = f"the part was {word}cut {'turned about' if turn else 'shifted along'} {axis} of its base by {size}"
         help = "touch the base off again; the next program corrects it at this place, no other program does"
         findings.append(Finding("LRN018", message, file, help=help))
     return findings

@@ -103,6 +103,7 @@ class Machine(Events):
         self.reads: dict[int, int] = {}
         self.scopes: list[Scope] = []
         self.steps = 0
+        self.continued = False
         self.robot = Robot(memory.cells)
         self.system = self.robot.system
 
@@ -133,6 +134,7 @@ class Machine(Events):
         while name[0] != "name":
             name = name[1]
         if name[1] in ("$POS_ACT", "$POS_FOR"):
+            self.stop_advance_run()
             return UNDETERMINED if tree[0] == "member" else dict.fromkeys(FRAME, UNDETERMINED)
         if tree in (("name", "$NULLFRAME"), ("name", "$WORLD")):
             return dict(ZERO)
@@ -140,9 +142,15 @@ class Machine(Events):
         return content(cell) if is_set(cell) else None
 
     def input(self, number: object) -> bool:
+        self.stop_advance_run()
         shown = self.inputs.get(number, (False,))
         count = self.reads[number] = self.reads.get(number, -1) + 1
         return shown[count % len(shown)]
+
+    def stop_advance_run(self) -> None:
+        """Nothing is planned ahead: the last motion ends exactly.  What an event does is in its own time."""
+        if not self.continued and not self.running:
+            self.robot.end_exactly()
 
     def value(self, tree: tuple) -> object:
         return evaluate(tree, self.resolve, self.call)
@@ -283,6 +291,7 @@ class Machine(Events):
         """Executes the statement ``at``; the place of the next one."""
         reader = line.reader()
         word = line.word
+        self.continued = at > 0 and scope.routine.lines[at - 1].word == "CONTINUE"
         following = line.tokens[1][1] if len(line.tokens) > 1 else ""
         if word == ";label":
             return at + 1
@@ -312,8 +321,10 @@ class Machine(Events):
         elif word == "RETURN":
             reader.take()
             raise _Return(self.value(reader.expression()) if reader.kind != "end" else None)
-        elif word in ("HALT", "CONTINUE", "SPLINE", "ENDSPLINE", "BRAKE"):
+        elif word in ("CONTINUE", "SPLINE", "ENDSPLINE", "BRAKE"):
             pass
+        elif word == "HALT":
+            self.stop_advance_run()
         elif word == "RESUME":
             self.resume()
         elif word == "TRIGGER":
@@ -322,6 +333,7 @@ class Machine(Events):
             self.interrupt(reader, scope)
         elif word == "WAIT":
             reader.take()
+            self.stop_advance_run()
             if reader.accept("FOR"):
                 self.value(reader.expression())
         elif word in _MOTIONS:
@@ -342,6 +354,8 @@ class Machine(Events):
         while name[0] != "name":
             name = name[1]
         if (name[1].startswith("$") and name[1] not in self.system) or name[1] == "$ADVANCE":
+            if name[1] == "$OUT":
+                self.stop_advance_run()
             return None
         if name[1] == "$VEL" and tree[0] == "member" and tree[2] != "CP":
             return None

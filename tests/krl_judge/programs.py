@@ -3,7 +3,7 @@
     program    = DEF part() declarations settings block END subprogram* event* function?
     block      = statement+
     statement  = motion | frame | assignment | if | switch | for | while | repeat | loop | call | jump | state | form
-               | later | spline
+               | later | spline | idle
     motion     = full | partial | named | jump to axes | relative | arc; each with C_DIS, C_VEL or exact
     target     = {X .. C} of numbers, variables, expressions; a point of the .dat or $config.dat; a local frame; an
                  element; a part of a structure; frame : frame
@@ -19,6 +19,7 @@
     spline     = SPLINE, then SPL and SLIN to full and partial points, ENDSPLINE
     jump       = IF .. THEN GOTO over what follows, or back as long as a counter or an input says
     form       = an inline form: FDAT, LDAT or PDAT, BAS(#CP_PARAMS,..), a point of the .dat
+    idle       = HALT, WAIT SEC, WAIT FOR, $OUT[n]= (all stop the advance run), behind CONTINUE or not; a comment
     state      = $VEL.CP, $APO.CDIS, $ORI_TYPE, BAS(#VEL_CP,..)
 
 Every local variable is set before it is read, as far as the flow does not skip it.  Subprograms call later ones only.
@@ -206,11 +207,10 @@ class Generator(Later):
 
     def idle(self) -> list[str]:
         n = self.rng.choice(INPUTS)
-        return [
-            self.rng.choice(
-                [";note", "HALT", "WAIT SEC 0.5", f"$OUT[{n}]=TRUE", f"WAIT FOR $IN[{n}]", ";LIN {X 9}", ""]
-            )
-        ]
+        idle = self.rng.choice(
+            [";note", "HALT", "WAIT SEC 0.5", f"$OUT[{n}]=TRUE", f"WAIT FOR $IN[{n}]", ";LIN {X 9}", ""]
+        )
+        return ["CONTINUE", idle] if self.rng.random() < 0.2 else [idle]
 
     def probe(self) -> list[str]:
         """A motion that shows what the flow before has left."""

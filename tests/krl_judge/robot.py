@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from . import motions as way
 from .motions import NAN, End, Executed, Six
@@ -148,6 +148,11 @@ class Robot:
         self.executed.append(Executed(line, "AXIS", (None,) * 6, axes, base, tool, approximation=None))
         known = not any(math.isnan(a) for a in axes)
         self.end = End((None if known else NAN,) * 6, axes, axes if known else None, base, tool)
+
+    def end_exactly(self) -> None:
+        """The last motion is not approximated."""
+        if self.executed and self.executed[-1].approximation is not None:
+            self.executed[-1] = replace(self.executed[-1], approximation=0.0)
 
     def distance(self, rounds: tuple[str, ...]) -> float | None:
         if not rounds:

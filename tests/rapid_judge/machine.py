@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 TOKEN = re.compile(
     r"\s+|(?P<remark>!.*)|(?P<num>\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+)|(?P<name>[A-Za-z]\w*)|(?P<text>\"[^\"]*\")"
@@ -280,6 +280,8 @@ class Machine:
         required, options, j = self._arguments(i + 1)
         if word in ("movel", "movej", "movec", "moveldo"):
             self._move(word, line, required, options)
+        elif word == "waittime" and self.done and (required[0][0] >= 0.2 or "inpos" in options):
+            self.done[-1] = replace(self.done[-1], zone=0.0)  # too late to be planned ahead
         elif word == "pdispset":
             self.displaced = True
         elif word == "pdispoff":

@@ -32,15 +32,14 @@ _FLOWING = frozenset(
     b"$SPL_VEL_MODE $SPL_VEL_RESTR BASE_DATA TOOL_DATA LOAD_DATA".split()
 ) | {name for name in SYSTEM if name not in (b"$WORLD", b"$ROBROOT")}
 _WORDS = frozenset(
-    b"AND OR NOT EXOR B_AND B_OR B_NOT B_EXOR IF THEN ELSE ENDIF WHILE ENDWHILE REPEAT UNTIL FOR TO STEP ENDFOR LOOP "
-    b"ENDLOOP SWITCH CASE DEFAULT ENDSWITCH RETURN RESUME TRUE FALSE DECL GLOBAL "
+    b"AND OR NOT EXOR B_AND B_OR B_NOT B_EXOR IF THEN WHILE UNTIL FOR TO STEP SWITCH CASE RETURN TRUE FALSE "
     b"ABS SIN COS TAN ACOS ATAN ATAN2 SQRT FORWARD INVERSE INV_POS "
     b"X Y Z A B C S T E1 E2 E3 E4 E5 E6 A1 A2 A3 A4 A5 A6".split()
 )
 _SILENT_WORDS = frozenset(
     b"TRIGGER INTERRUPT GLOBAL CONTINUE EXT EXTFCT EXTP IMPORT SIGNAL ENUM STRUC INI BRAKE".split()
 )
-_EVALUATED = frozenset(["open", "branch", "close", "return", "assignment"])
+_DECIDING = frozenset(b"IF WHILE UNTIL FOR SWITCH CASE RETURN".split())
 _TALKING = frozenset(
     b"IR_STOPM CWRITE CREAD SREAD SWRITE COPEN CCLOSE MBX_REC MSGNOTIFY MSGQUIT MSGDIALOG MSGLOOP CONFIRM DELMENS "
     b"IS_KEY_PRESSED GETSYSSTATE GET_SIG_INF TIMER_LIMIT".split()
@@ -67,18 +66,26 @@ def _stop(statement: Statement, type_of: Callable[[bytes], bytes]) -> Stop:
     if isinstance(said, Call):
         if said.name == b"PULSE":
             return Stop.SURE
-        return max(Stop.MAYBE if said.name in _TALKING else Stop.NONE, _read(said.arguments, type_of))
-    if isinstance(said, Assignment) and SYSTEM.get(said.name) == "record":
-        return Stop.NONE  # the records of inline forms are no signals
+        return max(Stop.MAYBE if said.name in _TALKING else Stop.NONE, _read_of_system(said.arguments))
+    if isinstance(said, Assignment) and said.name in _FLOWING:
+        return _read_of_system(said.value)
     if isinstance(said, Assignment):
         return max(_name(said.name, type_of), _read(said.element or b"", type_of), _read(said.value, type_of))
-    return _read(statement.code, type_of) if kind in _EVALUATED else Stop.NONE
+    return _read(statement.code, type_of) if word in _DECIDING else Stop.NONE
 
 
 def _read(code: bytes, type_of: Callable[[bytes], bytes]) -> Stop:
     if not code or code.isdigit():
         return Stop.NONE
     return max((_name(name, type_of) for name in _names(code)), default=Stop.NONE)
+
+
+def _read_of_system(code: bytes) -> Stop:
+    """The same where no signal is read: in records, and in what is handed over."""
+    if b"$" not in code:
+        return Stop.NONE
+    names = (name for name in _names(code) if name.startswith(b"$"))
+    return max((_name(name, lambda _: b"") for name in names), default=Stop.NONE)
 
 
 @kept
