@@ -247,3 +247,26 @@ def test_a_block_that_the_last_statement_opens_behind_a_return_is_read(opens: st
     text = f"DEF cut_off()\nLIN {{X 1,Y 2,Z 3,A 0,B 0,C 0}}\nIF x THEN\nRETURN\n{opens}"
     document = Document(Path("cut_off.src"), text.encode("latin-1"))
     assert len(KrlDialect().read((document,)).toolpath) == 1
+
+
+def test_what_two_paths_leave_differently_is_not_inherited_though_the_orientation_stays() -> None:
+    """With a constant orientation A, B, C of a partial point do not matter; a Y that is not known does."""
+
+    def branch(other: str) -> dict[int, str]:
+        one = "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}"
+        found = body(
+            f"$ORI_TYPE=#CONSTANT\n{one}\nIF $IN[1] THEN\n{one}\nELSE\n{other}\nENDIF\nLIN {{X 5}}\n"
+        )
+        refused = found.toolpath.constraints.refused
+        return {row - len(found.toolpath) + 4: finding.message for row, finding in refused.items()}
+
+    assert "omits Y, A" in branch("LIN {X 1,Y 9,Z 3,A 7,B 5,C 6}")[3]
+    assert "several motions" in branch("LIN {X 1,Y 2,Z 3,A 7,B 5,C 6}")[3]
+
+
+def test_from_where_a_motion_may_start() -> None:
+    line = "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+    path = body(f"{line}IF $IN[1] THEN\n{line}ELSE\n{line}ENDIF\n{line}{line}").toolpath
+    last = len(path) - 1
+    assert path.predecessors == {last - 3: (last - 4,), last - 2: (last - 4,), last - 1: (last - 3, last - 2)}
+    assert path.continues.tolist()[-5:] == [True, False, False, False, True]
