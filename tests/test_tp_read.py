@@ -18,6 +18,7 @@ from postproc.languages.tp.position_data import COMMON_POINT, read_positions
 from postproc.toolpath.initial_state import InitialState
 
 CASES = TP_CASES
+NAN = float("nan")
 TP = CASES.dialect
 POINT = """P[{n}]{{
    GP1:
@@ -119,6 +120,22 @@ def test_corners_and_stops() -> None:
     nan = np.nan
     assert path.approximation / MM == pytest.approx([0, nan, nan, nan, 10, 0], nan_ok=True)
     assert path.stops.tolist() == [True, False, False, False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("between", "corner"),
+    [
+        ((), 5), (("DO[1]=ON",), 5), (("!note",), 5), (("R[1]=2",), 5), (("WAIT   .50(sec)",), 0),
+        (("WAIT 2(sec)",), 0), (("PAUSE",), 0), (("WAIT .00(sec)",), NAN), (("WAIT DI[1]=ON",), NAN),
+        (("WAIT R[3]",), NAN),
+        (("WAIT DI[1]=ON TIMEOUT,LBL[1]", "LBL[1]"), NAN), (("IF DI[1]=ON,WAIT 1(sec)",), NAN),
+    ],
+)  # fmt: skip
+def test_a_motion_before_which_the_program_waits_is_exact(between: tuple[str, ...], corner: float) -> None:
+    motions = [f"L P[{number}] 50mm/sec CR5" for number in range(1, 5)]
+    path = body("UFRAME_NUM=1", "UTOOL_NUM=1", *motions[:2], *between, *motions[2:]).toolpath
+    assert path.approximation / MM == pytest.approx([5, corner, 5, 5], nan_ok=True)
+    assert path.stops.tolist() == [False, corner == 0, False, False]
 
 
 def test_forces_are_those_of_the_comments_that_were_passed_last() -> None:

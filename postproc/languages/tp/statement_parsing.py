@@ -31,6 +31,7 @@ from postproc.languages.tp.tp_statements import (
     TimeoutStatement,
     TpRemark,
     TpStatement,
+    WaitStatement,
 )
 
 _REMARK = re.compile(rb"[ \t]*+(!|//|--[a-z]{2}:)")
@@ -88,9 +89,16 @@ _STOPS = re.compile(
 _MAY_DISPLACE = re.compile(
     rb"OFFSET|TRACK|TOUCH|SEARCH|SOFT|WEAVE|FORCE|SENS|LINE|COORD|GROUP|TOOL|FRAME|PREG|POS", re.I
 )
+_WAIT = re.compile(
+    rb"PAUSE|WAIT[ \t]*+((?:[0-9]{1,9}+(?:\.[0-9]{0,9}+)?+|\.[0-9]{1,9}+))[ \t]*+(?:\([ \t]*+sec[ \t]*+\))?+",
+    re.I,
+)
+_WAIT_FOR = re.compile(rb"WAIT\b", re.I)
+SHORTEST_WAIT_S = 0.2
+"""A WAIT of as much is not over when the robot, which the program is ahead of, is in the corner."""
 _OTHER = re.compile(
     rb"(?:(?:DO|RO|GO|AO|SO|UO|WO|F|M|SR|AR|DI|RI|GI|AI|TIMER|ENC|VR|PL)[ \t]*+\[.*\][ \t]*+=.*"
-    rb"|WAIT\b.*|PAUSE|MESSAGE[ \t]*+\[.*|UALM[ \t]*+\[.*|PAYLOAD\b.*"
+    rb"|MESSAGE[ \t]*+\[.*|UALM[ \t]*+\[.*|PAYLOAD\b.*"
     rb"|COL[ \t]++(?:DETECT|GUARD).*|(?:Arc|Weld)[ \t]++(?:Start|End|Stabilize).*|SPOT\[.*"
     rb"|(?:TOOL_)?+OFFSET[ \t]++CONDITION.*|VOFFSET[ \t]++CONDITION.*|SKIP[ \t]++CONDITION.*"
     rb"|(?:UN)?+LOCK[ \t]++PREG|RSR\[.*|DIAG_REC\[.*|PRINT\b.*|STRLEN\b.*|Sample[ \t]++(?:Start|End).*"
@@ -189,6 +197,10 @@ def _parse_settings(text: bytes) -> TpStatement:
         return DisplacementSwitch(_name(found[1] or found[2]), False)
     if (found := _STARTS.fullmatch(text)) is not None:
         return DisplacementSwitch(_name(found[1]), True)
+    if (found := _WAIT.fullmatch(text)) is not None:
+        return WaitStatement(found[1] is None or float(found[1]) >= SHORTEST_WAIT_S)
+    if _WAIT_FOR.match(text):
+        return WaitStatement(False)
     return (
         OtherStatement()
         if _OTHER.fullmatch(text)

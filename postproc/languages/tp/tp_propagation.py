@@ -24,9 +24,11 @@ from postproc.languages.tp.tp_statements import (
     RegisterExpression,
     RegisterOperand,
     StatementNotRead,
+    TimeoutStatement,
     TpMove,
     TpRemark,
     TpStatement,
+    WaitStatement,
 )
 
 START, ELSEWHERE = -1, -2
@@ -101,15 +103,26 @@ class TpState:
         return replace(self, registers=tuple(sorted(known.items())))
 
 
+class Waits(IntEnum):
+    """Whether the program waits before the next motion, so that it cannot be planned ahead."""
+
+    NO = 0
+    MAYBE = 1
+    YES = 2
+
+
 class Reached(NamedTuple):
-    """What holds at a place of the program; ``last``: statements of the motions after which the robot is here."""
+    """What holds at a place of the program; ``last``: statements of the motions after which the robot is here;
+    ``waits``: whether the program waited since."""
 
     state: TpState
     last: frozenset[int] = frozenset([START])
+    waits: Waits = Waits.NO
 
     def joined(self, other: Reached) -> Reached:
         """What holds where two paths meet."""
-        return Reached(self.state.joined(other.state), self.last | other.last)
+        waits = self.waits if self.waits == other.waits else Waits.MAYBE
+        return Reached(self.state.joined(other.state), self.last | other.last, waits)
 
 
 NOWHERE = frozenset([ELSEWHERE])
@@ -120,7 +133,7 @@ class TpPropagation:
     """``before``: of each statement what holds before it, None where it is not run; ``jumps``: statement -> motions
     after which it is run, where that is not the statement before it alone; ``calls``: statement -> program that the
     file does not contain; ``reads``: statement that reads where the robot is -> motions after which; ``unread``:
-    statements that are not understood."""
+    statements that are not understood; ``waits``: motions before which the program waits, or may."""
 
     flow: StatementFlow
     before: list[TpState | None] = field(init=False)
@@ -128,6 +141,7 @@ class TpPropagation:
     calls: dict[int, str] = field(default_factory=dict)
     reads: dict[int, frozenset[int]] = field(default_factory=dict)
     unread: set[int] = field(default_factory=set)
+    waits: dict[int, Waits] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.before = [None] * len(self.flow.statements)
@@ -159,6 +173,8 @@ class TpPropagation:
                 self.before[at] = state.state
                 if len(state.last) != 1 or at - 1 not in state.last:
                     self.jumps[at] = state.last
+                if state.waits and isinstance(one, TpMove):
+                    self.waits[at] = state.waits
             if at == last - 1:
                 return self._leave(at, one, state, recording)
             state = self._step(at, one, state, recording)
@@ -186,7 +202,7 @@ class TpPropagation:
         return [(self.flow.block_at[there], new) for there, new in states.items() if there != END]
 
     def _step(self, at: int, one: TpStatement, reached: Reached, recording: bool) -> Reached:
-        state, last = reached
+        state, last, waits = reached
         if isinstance(one, TpMove):
             # where a displaced or interrupted motion ends is not in the text
             ends = {ELSEWHERE} if one.problem is not None else {at, ELSEWHERE} if state.displaced else {at}
@@ -196,7 +212,13 @@ class TpPropagation:
         if isinstance(one, PositionUse) and one.reads_place and recording:
             self.reads[at] = self.reads.get(at, frozenset()) | last
         new = self._state_after(at, one, state, recording)
-        return Reached(new, NOWHERE if isinstance(one, ProgramCall | StatementNotRead) else last)
+        if isinstance(one, ProgramCall | StatementNotRead):
+            return Reached(new, NOWHERE, Waits.MAYBE)
+        if isinstance(one, WaitStatement):
+            waits = Waits.YES if one.surely else max(waits, Waits.MAYBE)
+        elif isinstance(one, TimeoutStatement):
+            waits = max(waits, Waits.MAYBE)
+        return Reached(new, last, waits)
 
     def _state_after(self, at: int, one: TpStatement, state: TpState, recording: bool) -> TpState:
         """What holds after a statement that is no motion."""

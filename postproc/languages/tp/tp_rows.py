@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.base.arrays import Bools
+from postproc.base.arrays import Bools, Floats
 from postproc.base.document import Document
 from postproc.languages.tp.position_data import (
     CARTESIAN,
@@ -16,7 +16,14 @@ from postproc.languages.tp.position_data import (
 )
 from postproc.languages.tp.statement_flow import StatementFlow
 from postproc.languages.tp.tp_listing import NumberedStatement, TpListing
-from postproc.languages.tp.tp_propagation import CONTRADICTORY, ELSEWHERE, START, TpPropagation, TpState
+from postproc.languages.tp.tp_propagation import (
+    CONTRADICTORY,
+    ELSEWHERE,
+    START,
+    TpPropagation,
+    TpState,
+    Waits,
+)
 from postproc.languages.tp.tp_statements import PositionUse, StatementNotRead, TpMove, TpStatement
 from postproc.toolpath import LOST, FrameRef, Kind
 
@@ -33,7 +40,7 @@ class TpRows:
     their texts; ``targets``, ``middles`` (N,): numbers of their points, -1 without; ``states``: what holds before each,
     None where it is not run; ``problems``: row -> code and reason for which it cannot be corrected; ``jumps``: row ->
     rows after which it runs, where that is not the row before it alone: START for the start of the program, ELSEWHERE
-    for what it does not contain.
+    for what it does not contain; ``waits``: rows before which the program waits -> whether it surely does.
     """
 
     def __init__(self, at: list[int], moves: list[TpMove | None], run: TpPropagation) -> None:
@@ -51,6 +58,7 @@ class TpRows:
         self.base, self.tool = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
         self.nut, self.revolutions = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
         self.jumps = self._jumps(run)
+        self.waits = {int(self.row_of[one]): waits == Waits.YES for one, waits in run.waits.items()}
         self.axes: dict[int, tuple[float, ...]] = {}
         self.problems: dict[int, tuple[str, str]] = {}
         self.frames: list[FrameRef] = []
@@ -89,15 +97,18 @@ class TpRows:
     def refuse(self, row: int, code: str, message: str) -> None:
         self.problems.setdefault(row, (code, message))
 
-    def approximation(self, row: int) -> float:
-        """[mm] NaN where it is not known."""
-        move = self.moves[row]
-        word, value = (b"", None) if move is None else move.corner
-        return value if value is not None and word in (b"FINE", b"CR") else np.nan
-
-    def stops(self, row: int) -> bool:
-        move = self.moves[row]
-        return move is not None and move.corner[0] == b"FINE"
+    def approximations(self, continues: Bools) -> tuple[Floats, Bools]:
+        """(N,) [mm] by which each motion may leave its path before the target, NaN where not known; (N,) where the
+        robot stops: where the program waits before the next motion too.  continues (N,): as above."""
+        corners = [(b"", None) if move is None else move.corner for move in self.moves]
+        known = (b"FINE", b"CR")
+        blend = np.array([np.nan if value is None or word not in known else value for word, value in corners])
+        stops = np.array([word == b"FINE" for word, _ in corners], np.bool_)
+        for row, surely in self.waits.items():
+            before = [one for one in self.before(row) if one >= 0 and not stops[one]]
+            ends = surely and bool(continues[row])
+            blend[before], stops[before] = (0.0 if ends else np.nan), ends
+        return blend, stops
 
 
 class RowBuilder:

@@ -97,6 +97,13 @@ class TimeoutStatement:
 
 
 @dataclass(frozen=True, slots=True)
+class WaitStatement:
+    """A WAIT or PAUSE; ``surely``: it is not over when the next motion would have to be planned."""
+
+    surely: bool
+
+
+@dataclass(frozen=True, slots=True)
 class BlockStart:
     """IF ... THEN."""
 
@@ -197,6 +204,7 @@ TpStatement = (
     | JumpStatement
     | ConditionalStatement
     | TimeoutStatement
+    | WaitStatement
     | BlockStart
     | BlockElse
     | BlockEnd

@@ -39,6 +39,7 @@ def toolpath_of(
     continues = rows.continues()
     refused = {row: row_finding(document, rows, row, *rows.problems[row]) for row in sorted(rows.problems)}
     wrist = np.array([move is not None and move.wrist for move in rows.moves], np.bool_)
+    blend, stops = rows.approximations(continues)
     path = Toolpath(
         kind=kinds,
         position=position,
@@ -64,8 +65,8 @@ def toolpath_of(
         ),
         configuration=Configuration({"nut": rows.nut, "revolutions": rows.revolutions}),
         external=rows.external,
-        approximation=np.array([rows.approximation(row) for row in range(n)]) * MM,
-        stops=np.array([rows.stops(row) for row in range(n)], np.bool_),
+        approximation=blend * MM,
+        stops=stops,
         continues=continues,
         predecessors={
             row: rows.before(row)
