@@ -128,4 +128,6 @@ def stopped_motions(rows: MotionRows, continues: Bools) -> dict[int, float]:
         for before in {row - 1} if sources is None else expanded(rows, sources):
             if before >= 0:
                 found[before] = NAN
-    return found
+    # whether the advance run stops before the first motion of another module is not worked out
+    called = expanded(rows, {source for _, sources in rows.calls for source in sources})
+    return found | {before: NAN for before in called if before >= 0}

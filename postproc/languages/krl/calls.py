@@ -401,6 +401,8 @@ class Calls(BlockFlow):
         if left is not None:
             why = f"after the call of {shown(said.name)} in line {item.line}"
             take_exit(run.state, before, left, run.frames, why, item.line)
+            if left.moves:
+                run.rows.note_call(before.sources)
             run.state.unsettle(run.has_tcp_mode, run.has_turning)
 
     @abstractmethod

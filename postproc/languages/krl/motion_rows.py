@@ -72,6 +72,7 @@ class MotionRows:
     ``passing``: points of spline blocks; ``entries``: first point of such a block -> line of its header.
     ``arc_blends``: exact arcs -> $APO.CDIS [mm] there.  ``sources_of``: rows that may start elsewhere than where the
     row before ends -> where.  ``stopped``: rows before which the advance run stops (2) or may (1).
+    ``calls``: the count of rows, and after which ones a routine of another module moves the robot.
     ``left_from``: where routines end after which it is not known what runs.
     ``never_from``: the first row of those that never run.
     """
@@ -89,6 +90,7 @@ class MotionRows:
     whole: dict[int, str] = field(default_factory=dict)
     sources_of: dict[int, frozenset[Source]] = field(default_factory=dict)
     stopped: dict[int, int] = field(default_factory=dict)
+    calls: list[tuple[int, frozenset[Source]]] = field(default_factory=list)
     left_from: set[Source] = field(default_factory=set)
     never_from: int | None = None
     inline: dict[int, InlineForm] = field(default_factory=dict)
@@ -149,6 +151,10 @@ class MotionRows:
         if len(sources) != 1 or self.count - 1 not in sources:
             self.sources_of[self.count] = sources
 
+    def note_call(self, sources: frozenset[Source]) -> None:
+        """Notes that after these a routine of another module moves the robot first."""
+        self.calls.append((self.count, sources))
+
     def new_mark(self) -> bytes:
         """A mark of its own, without sources."""
         mark = b"join %d" % len(self.sources)
@@ -181,6 +187,8 @@ class MotionRows:
         ):  # fmt: skip
             while sparse and next(reversed(sparse)) >= count:
                 sparse.popitem()
+        while self.calls and self.calls[-1][0] > count:
+            self.calls.pop()
         while self.ranges and self.ranges[-1][0] >= count:
             self.ranges.pop()
 

@@ -121,8 +121,7 @@ class TpPositions(Mapping[int, TpPosition]):
         if start is None:
             return self._others[number]
         head = _HEAD.match(self._raw, start)
-        if head is None:
-            raise ValueError(f"P[{number}] is no longer where it was")
+        assert head is not None  # it was there when the file was read
         return _position(self._raw, head, len(self._raw))[0]
 
     def __contains__(self, number: object) -> bool:
@@ -143,8 +142,7 @@ class TpPositions(Mapping[int, TpPosition]):
         raw, found = self._raw, []
         for number in numbers:
             point = COMMON_POINT.match(raw, raw.index(b"{", self._common[number]) + 1)
-            if point is None:
-                raise ValueError(f"P[{number}] is no longer where it was")
+            assert point is not None
             found.append([at for span in point.regs[4:10] for at in span])
         return np.array(found, np.int64).reshape(-1, 2 * len(CARTESIAN))
 
