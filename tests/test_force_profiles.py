@@ -96,7 +96,7 @@ def test_a_profile_of_an_arc_has_places_all_along_it():
     assert found.share[~arc].tolist() == [0.0, 1.0]
 
 
-def test_the_factors_of_a_cell_act_on_profiles_too():
+def test_the_factors_of_a_cell_act_on_profiles_and_ramps_too():
     """A factor of 2, and a turn by 90 deg about the vertical: what lies in the plane turns as a whole."""
     motion, share, rest, rng = drawn(2)
     n, extent = 20, np.full(20, 0.1)
@@ -105,12 +105,16 @@ def test_the_factors_of_a_cell_act_on_profiles_too():
     carries = np.ones(n, bool)
     forces = Wrenches(values, values, carries, "test", (), np.zeros(n, bool))
     forces = replace(forces, ramps=Ramps.profile(motion, share, rest, extent))
+    forces = forces.ramped(
+        np.array([3, 11]), np.array([0.03, 0.25]), extent
+    )  # one goes over motions that follow
     names = OperationNames(("TOOL 1",), np.zeros(n, int))
     base = np.tile(np.eye(3), (n, 1, 1))
     rows, at = np.repeat(np.arange(n), 7), np.tile(np.linspace(0, 1, 7), n)
     before = forces.along(rows, at)
     doubled = ForceFactors({"TOOL 1": 2.0}, {}).acting(forces, names, base)
     np.testing.assert_allclose(doubled.along(rows, at), 2 * before, atol=1e-9)
+    forces = replace(forces, ramps=forces.ramps.only(forces.ramps.inside))
     places = forces.ramps.places()[:2]
     turned = ForceFactors({}, {"TOOL 1": (0.0, np.pi / 2)}).acting(forces, names, base).along(*places)
     old = forces.along(*places)

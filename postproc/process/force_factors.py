@@ -53,12 +53,16 @@ class ForceFactors:
         )
         if forces.ramps is None:
             return acting
-        at, share, _ = forces.ramps.places()
-        rest = act(forces.along(at, share), at) - acting.along(at, share)
-        rest[(share == 0.0) | (share == 1.0)] = 0.0
         extent = np.zeros(count)
         extent[forces.ramps.row] = forces.ramps.extent
-        return replace(acting, ramps=Ramps.profile(at, share, rest, extent))
+        profiles, steps = (forces.ramps.only(some) for some in (forces.ramps.inside, ~forces.ramps.inside))
+        if len(profiles.row):
+            at, share, _ = profiles.places()
+            rest = act(replace(forces, ramps=profiles).along(at, share), at) - acting.along(at, share)
+            rest[(share == 0.0) | (share == 1.0)] = 0.0
+            acting = replace(acting, ramps=Ramps.profile(at, share, rest, extent))
+        starts = steps.start == 0.0
+        return acting.ramped(steps.row[starts], steps.length[starts], extent)
 
 
 def axes_across(force: Floats, axes: Floats) -> tuple[Floats, Floats]:

@@ -86,6 +86,10 @@ class Ramps:
             np.ones(int(some.sum()), bool),
         )
 
+    def only(self, some: Bools) -> Ramps:
+        """The parts ``some`` (E,)."""
+        return Ramps(*(getattr(self, one.name)[some] for one in fields(self)))
+
     def places(self) -> tuple[Ints, Floats, Floats]:
         """Of profiles: the motions (P,), shares (P,) and wrenches (P, 6) that they were made of (see ``profile``)."""
         motions = np.unique(self.row)
