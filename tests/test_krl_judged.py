@@ -260,7 +260,7 @@ CARELESS = {
     "inputs are true": (altered(r"\$IN\s*\[[^\]]*\]", "TRUE"), 0.3),
     "inputs are false": (altered(r"\$IN\s*\[[^\]]*\]", "FALSE"), 0.3),
     "no jump is taken": (altered(r"^\s*GOTO.*$", ""), 0.05),
-    "no component is set": (altered(r"^\s*\w+\s*\.\s*[XYZABC]\s*=.*$", ""), 0.05),
+    "no component is set": (altered(r"^\s*\w+\s*\.\s*[XYZABC]\s*=.*$", ""), 0.02),
     "no frame is set in a table": (altered(r"^\s*(BASE|TOOL)_DATA\s*\[.*$", ""), 0.02),
     "no subprogram is called": (altered(r"^\s*sub\d\s*\(.*$", ""), 0.05),
     "no record of frames is taken": (altered(r"^\s*FDAT_ACT\s*=.*$", "FDAT_ACT={TOOL_NO 1,BASE_NO 1}"), 0.05),

@@ -370,8 +370,8 @@ def test_a_motion_of_many_parts_is_told_by_its_last():
     document = Document(Path("a.src"), b"LIN A\n")
     edits = [Edit(Span(0, 0, 0), b"".join(b"LIN %d\n" % k for k in range(9)))]
     told = source_texts(document, [1], edits)[0][1]
-    assert told[-1] == "and 5 more lines"
-    assert told[-2] == "LIN A"
+    assert told[0] == "5 more lines, then"
+    assert told[-1] == "LIN A"
 
 
 @given(st.text())

@@ -205,7 +205,7 @@ LINES = [f"MoveL [[{x},2,3],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,
     [
         ("", 5), ("SetDO out1,1;", 5), ("i:=1;", 5), ("! a remark", 5), ("AccSet 50,50;", 5), ("quick;", 5),
         ("WaitTime 0.5;", 0), ("WaitTime \\InPos,0;", 0), ("Stop;", 0), ("WaitRob \\InPos;", 0), ("slow;", 0),
-        ("WaitTime 0;", np.nan), ("WaitDI in1,1;", np.nan), ("unread;", 5), ("WaitTime how_long;", np.nan),
+        ("WaitTime 0;", np.nan), ("WaitDI in1,1;", np.nan), ("unread;", np.nan), ("WaitTime how_long;", np.nan),
         ("IF ready WaitTime 1;", np.nan), ("IF ready THEN\nSetDO out1,1;\nENDIF", 5),
     ],
 )  # fmt: skip

@@ -214,10 +214,10 @@ def source_texts(
             at = int(every.stop[k])
         source = raw[start:stop].rstrip(b"\r\n")
         after = b"".join([*parts, raw[at:stop]]).splitlines()
-        more = [f"and {len(after) - LINES} more lines"] if len(after) > LINES else []
+        more = [f"{len(after) - LINES} more lines, then"] if len(after) > LINES else []
         text = _text(source)
         written = [text if row == source else _text(row) for row in after[-LINES:]]
-        texts.append((text, tuple(written + more)))
+        texts.append((text, tuple(more + written)))
     return texts
 
 

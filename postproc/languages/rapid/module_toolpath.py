@@ -52,7 +52,7 @@ def module_toolpath(
     unknown = sorted(rows.problems)
     refused = {row: _finding(document, rows, row, *rows.problems[row]) for row in unknown}
     facts = rows.facts
-    zone, stops = _zones(rows, continues)
+    zone, stops = _zones(rows, continues, flow.waited)
     toolpath = Toolpath(
         kind=kind,
         position=position,
@@ -100,9 +100,10 @@ def module_toolpath(
     return toolpath, places, findings
 
 
-def _zones(rows: ModuleRows, continues: Bools) -> tuple[Floats, Bools]:
+def _zones(rows: ModuleRows, continues: Bools, waited: set[int]) -> tuple[Floats, Bools]:
     """(N,) [m] by which each motion may leave its path before the target, NaN where not known; (N,) where the robot
-    stops: where the program waits before the next motion too, whatever zone is stated."""
+    stops: where the program waits before the next motion too, whatever zone is stated.  waited: offsets of motions
+    after which it waits, and goes on where the file does not say."""
     zone = rows.per_row([fact.zone * MM for fact in rows.facts], float)
     stops = rows.per_row([fact.stops for fact in rows.facts], np.bool_)
     for first, _, fact in rows.each():
@@ -112,6 +113,9 @@ def _zones(rows: ModuleRows, continues: Bools) -> tuple[Floats, Bools]:
         surely = fact.waits == Waits.YES and bool(continues[first])
         zone[before] = 0.0 if surely else np.nan
         stops[before] |= surely
+    for at in waited & rows.ends.keys():
+        row = rows.ends[at]
+        zone[row] = 0.0 if stops[row] else np.nan
     return zone, stops
 
 

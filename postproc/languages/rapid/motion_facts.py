@@ -153,6 +153,15 @@ def not_read(statement: Instruction, form: MotionForm, state: ProgramState, mess
     )  # fmt: skip
 
 
+def override_of(arguments: tuple[Argument, ...], evaluator: Evaluator) -> float | None:
+    """The factor of VelSet; a limit below usual speeds makes it unknown."""
+    values = [evaluator.value(a.value) for a in arguments if a.value is not None]
+    numbers = [number_of(value) for value in values]
+    if len(numbers) != 2 or numbers[0] is None or numbers[1] is None or numbers[1] < 5000:
+        return None
+    return numbers[0] / 100.0
+
+
 def waits_at(step: Instruction, evaluator: Evaluator) -> Waits:
     """Whether the program waits at an instruction."""
     if step.name == b"WAITTIME":

@@ -25,7 +25,7 @@ from postproc.languages.rapid.instructions import (
     MotionForm,
     is_motion,
 )
-from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read, waits_at
+from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read, override_of, waits_at
 from postproc.languages.rapid.program_state import ELSEWHERE, START, ProgramState, Waits
 from postproc.languages.rapid.routine_runner import RoutineRunner
 from postproc.languages.rapid.syntax_tree import (
@@ -42,7 +42,7 @@ from postproc.languages.rapid.syntax_tree import (
     RapidRoutine,
     Remark,
 )
-from postproc.languages.rapid.values import UnknownData, Value, number_of, plain, replaced, truth_of
+from postproc.languages.rapid.values import UnknownData, Value, plain, replaced, truth_of
 from postproc.toolpath import ArcFrame, Kind, OrientationMode
 
 OTHER = MotionForm(Kind.OTHER)
@@ -99,6 +99,7 @@ class Propagation:
         self._locals: dict[bytes, dict[bytes, tuple[bytes, bytes]]] = {}
         self._active: list[RapidRoutine] = []
         self.rows = 0
+        self.waited: set[int] = set()
         self._steps = MOST_STEPS + 4 * sum(_length(one) for r in module.routines for one in walk(r.body))
         self._runner = RoutineRunner(self._after)
 
@@ -149,7 +150,15 @@ class Propagation:
             else:
                 state.values = {name: UnknownData("it differs between runs") for name in state.values}
         self._runner.start()
-        self._routine(routine, state, True)
+        end = self._routine(routine, state, True)
+        if end is not None:
+            self._leave_place(end)
+
+    def _leave_place(self, state: ProgramState) -> None:
+        """What the file does not contain goes on, or nothing does."""
+        if state.waits != Waits.NO:
+            self.waited |= state.last
+        state.last = frozenset([ELSEWHERE])
 
     def _routine(self, routine: RapidRoutine, state: ProgramState, recording: bool) -> ProgramState | None:
         """The state after a routine; None where it does not come back."""
@@ -206,7 +215,7 @@ class Propagation:
             return
         for name in step.names:
             self._forget(name, state, "a statement that is not understood may change it")
-        state.last = frozenset([ELSEWHERE])
+        self._leave_place(state)
         if step.names & (DISPLACING | RESTORING.keys()):
             state.displaced |= {b"a statement that is not understood"}
 
@@ -260,7 +269,7 @@ class Propagation:
             arcs = {frozenset([b"PATHFRAME"]): ArcFrame.PATH, frozenset([b"OBJECTFRAME"]): ArcFrame.BASE}
             state.arc = arcs.get(frozenset(options), ArcFrame.UNKNOWN)
         elif name == b"VELSET":
-            state.override = self._override(step.arguments, state)
+            state.override = override_of(step.arguments, self._evaluator(state))
         elif name in WRITERS:
             self._change(step.arguments, state)
         elif name in (b"ACTUNIT", b"DEACTUNIT"):
@@ -269,14 +278,6 @@ class Propagation:
             self._unread_call(step, state, moves=True)
         elif name.startswith(b"WAIT"):
             self._change(tuple(a for a in step.arguments if a.name), state)
-
-    def _override(self, arguments: tuple[Argument, ...], state: ProgramState) -> float | None:
-        """The factor of VelSet; a limit below usual speeds makes them unknown."""
-        values = [self._evaluator(state).value(a.value) for a in arguments if a.value is not None]
-        numbers = [number_of(value) for value in values]
-        if len(numbers) != 2 or numbers[0] is None or numbers[1] is None or numbers[1] < 5000:
-            return None
-        return numbers[0] / 100.0
 
     def _move(self, step: Instruction, fact: MotionFact, state: ProgramState) -> None:
         self._record(step.start, fact)
@@ -306,7 +307,7 @@ class Propagation:
             if any(_sets_modes(one) for one in self.module.routines if one not in self._active):
                 state.displaced |= {b"a procedure whose name is computed"}
         if moves:
-            state.last = frozenset([ELSEWHERE])
+            self._leave_place(state)
 
     def _change(self, arguments: tuple[Argument, ...], state: ProgramState) -> None:
         for name in names_in(arguments):
@@ -343,7 +344,7 @@ class Propagation:
                 shared.append((parameter.name, argument))
         after = self._routine(routine, inner, self._runner.recording)
         if after is None:
-            state.last = frozenset([ELSEWHERE])
+            self._leave_place(state)
             return
         state.take(after)
         changed = self._assigned_by(routine.name)
@@ -383,7 +384,7 @@ class Propagation:
                 reached = self._reached(one.name)
                 self._forget_all(self._assigned_by(one.name), state)
                 if reached & self.usage.moves:
-                    state.last = frozenset([ELSEWHERE])
+                    self._leave_place(state)
             if isinstance(one, FunctionCall) and one.name in READERS:
                 self._note_reading(one.start, state)
             if isinstance(one, tuple):
