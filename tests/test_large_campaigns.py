@@ -80,4 +80,5 @@ def test_what_a_search_in_a_part_finds_is_fitted_to_all():
     (part_of,) = [e for e in done.search.final.estimates if e.unknown.parameter.name == "c2"]
     assert abs(all_of.value - 1.6 * term.values["c2"]) < 2 * all_of.ci95
     share = np.sqrt(len(done.search.base.campaign) / len(campaign))
-    assert 0.8 * share * part_of.ci95 < all_of.ci95 < 2 * part_of.ci95  # what the fit leaves out is in it too
+    # no smaller than by all readings; what the fit leaves out is in it too
+    assert 0.8 * share * part_of.ci95 < all_of.ci95 < 0.005 * all_of.value
