@@ -8,23 +8,14 @@ operating and programming instructions for system integrators, "advance run"); C
 from __future__ import annotations
 
 from collections.abc import Callable
-from enum import IntEnum
 
 from postproc.base.arrays import Bools
+from postproc.languages.core.waits import Waits
 from postproc.languages.krl.lexing import Assignment, Call, Statement, identifiers, kept
 from postproc.languages.krl.modal_state import NAN
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.predecessors import expanded
 from postproc.languages.krl.statement_effects import READS_POSITION, SYSTEM, bas
-
-
-class Stop(IntEnum):
-    """Whether the advance run stops."""
-
-    NONE = 0
-    MAYBE = 1
-    SURE = 2
-
 
 _STOPPING = frozenset(b"$IN $OUT $ANIN $ANOUT $DIGIN1 $DIGIN2 $DIGIN3 $DIGIN4 $DIGIN5 $DIGIN6".split())
 _FLOWING = frozenset(
@@ -46,46 +37,46 @@ _TALKING = frozenset(
 )
 
 
-def stop_of(statement: Statement, continued: bool, type_of: Callable[[bytes], bytes]) -> Stop:
+def stop_of(statement: Statement, continued: bool, type_of: Callable[[bytes], bytes]) -> Waits:
     """Whether the advance run stops at a statement other than a motion; continued: CONTINUE is before it; type_of: the
     type with which a variable is declared.  What is not declared may be a signal, and stop it."""
     found = _stop(statement, type_of)
-    if found is Stop.SURE and continued:
-        return Stop.MAYBE if statement.word == b"WAIT" else Stop.NONE
+    if found is Waits.YES and continued:
+        return Waits.MAYBE if statement.word == b"WAIT" else Waits.NO
     return found
 
 
-def _stop(statement: Statement, type_of: Callable[[bytes], bytes]) -> Stop:
+def _stop(statement: Statement, type_of: Callable[[bytes], bytes]) -> Waits:
     kind, word, said = statement.kind, statement.word, statement.strings
     if word in (b"WAIT", b"HALT"):
-        return Stop.SURE
+        return Waits.YES
     if word in _SILENT_WORDS or kind in ("comment", "def", "end", "label", "goto", "exit", "declaration"):
-        return Stop.NONE
+        return Waits.NO
     if word in (b"ANOUT", b"ANIN", b"DIGIN") or kind in ("strange", "foreign"):
-        return Stop.MAYBE
+        return Waits.MAYBE
     if isinstance(said, Call):
         if said.name == b"PULSE":
-            return Stop.SURE
-        return max(Stop.MAYBE if said.name in _TALKING else Stop.NONE, _read_of_system(said.arguments))
+            return Waits.YES
+        return max(Waits.MAYBE if said.name in _TALKING else Waits.NO, _read_of_system(said.arguments))
     if isinstance(said, Assignment) and said.name in _FLOWING:
         return _read_of_system(said.value)
     if isinstance(said, Assignment):
         return max(_name(said.name, type_of), _read(said.element or b"", type_of), _read(said.value, type_of))
-    return _read(statement.code, type_of) if word in _DECIDING else Stop.NONE
+    return _read(statement.code, type_of) if word in _DECIDING else Waits.NO
 
 
-def _read(code: bytes, type_of: Callable[[bytes], bytes]) -> Stop:
+def _read(code: bytes, type_of: Callable[[bytes], bytes]) -> Waits:
     if not code or code.isdigit():
-        return Stop.NONE
-    return max((_name(name, type_of) for name in _names(code)), default=Stop.NONE)
+        return Waits.NO
+    return max((_name(name, type_of) for name in _names(code)), default=Waits.NO)
 
 
-def _read_of_system(code: bytes) -> Stop:
+def _read_of_system(code: bytes) -> Waits:
     """The same where no signal is read: in records, and in what is handed over."""
     if b"$" not in code:
-        return Stop.NONE
+        return Waits.NO
     names = (name for name in _names(code) if name.startswith(b"$"))
-    return max((_name(name, lambda _: b"") for name in names), default=Stop.NONE)
+    return max((_name(name, lambda _: b"") for name in names), default=Waits.NO)
 
 
 @kept
@@ -93,24 +84,24 @@ def _names(code: bytes) -> frozenset[bytes]:
     return identifiers(code) - _WORDS
 
 
-def _name(name: bytes, type_of: Callable[[bytes], bytes]) -> Stop:
+def _name(name: bytes, type_of: Callable[[bytes], bytes]) -> Waits:
     if name in _STOPPING or READS_POSITION.match(name):
-        return Stop.SURE
+        return Waits.YES
     if name in _FLOWING or (not name.startswith(b"$") and type_of(name)):
-        return Stop.NONE
-    return Stop.MAYBE
+        return Waits.NO
+    return Waits.MAYBE
 
 
-def advance_of(statement: Statement) -> Stop | None:
-    """What a statement makes of $ADVANCE: SURE where no motion is planned ahead of another; None: nothing."""
+def advance_of(statement: Statement) -> Waits | None:
+    """What a statement makes of $ADVANCE: YES where no motion is planned ahead of another; None: nothing."""
     said = statement.strings
     if isinstance(said, Assignment) and said.name == b"$ADVANCE":
         digits = said.value.strip()
         if not digits.isdigit():
-            return Stop.MAYBE
-        return Stop.NONE if int(digits) else Stop.SURE
+            return Waits.MAYBE
+        return Waits.NO if int(digits) else Waits.YES
     if isinstance(said, Call) and said.name == b"BAS" and (bas(said.arguments) or (b"",))[0] == b"INITMOV":
-        return Stop.NONE
+        return Waits.NO
     return None
 
 
@@ -122,7 +113,7 @@ def stopped_motions(rows: MotionRows, continues: Bools) -> dict[int, float]:
     found: dict[int, float] = {}
     for row, stop in rows.stopped.items():
         if row and continues[row]:
-            found[row - 1] = 0.0 if stop == Stop.SURE else NAN
+            found[row - 1] = 0.0 if stop == Waits.YES else NAN
             continue
         sources = rows.sources_of.get(row)
         for before in {row - 1} if sources is None else expanded(rows, sources):

@@ -7,7 +7,7 @@ from abc import abstractmethod
 from collections.abc import Set
 from functools import lru_cache
 
-from postproc.languages.krl.advance_run import Stop
+from postproc.languages.core.waits import Waits
 from postproc.languages.krl.assignments import command, keep
 from postproc.languages.krl.block_flow import BlockFlow
 from postproc.languages.krl.expressions import Value, index_text
@@ -337,7 +337,7 @@ class Calls(BlockFlow):
         why = f"after the call of {called} in line {item.line}"
         routine = run.survey.routines.get(name)
         if not is_harmless(name):
-            run.state.stop = max(run.state.stop, Stop.MAYBE)
+            run.state.stop = max(run.state.stop, Waits.MAYBE)
         if routine is not None:
             mark = b"routine %d" % routine.line
             run.rows.sources[mark] |= run.state.sources
@@ -388,7 +388,7 @@ class Calls(BlockFlow):
         run.mentioned |= identifiers(said.arguments)
         given = [run.value(text.strip()) if text.strip() else None for text in split_values(said.arguments)]
         before = run.state.copy()
-        run.state.stop = max(run.state.stop, Stop.MAYBE)
+        run.state.stop = max(run.state.stop, Waits.MAYBE)
         returned = returned_by(said, run.survey.directions)
         self._after_other(item, said.name, returned)
         if any(isinstance(effect, str) for effect in returned):

@@ -6,8 +6,9 @@ import contextlib
 import re
 from dataclasses import replace
 
+from postproc.languages.core.waits import Waits
 from postproc.languages.krl import motions
-from postproc.languages.krl.advance_run import Stop, advance_of, stop_of
+from postproc.languages.krl.advance_run import advance_of, stop_of
 from postproc.languages.krl.assignments import assign, declare
 from postproc.languages.krl.calls import Calls
 from postproc.languages.krl.execution_context import Flow
@@ -132,7 +133,7 @@ class ProgramFlow(Calls):
         run = self.run
         mark = b"routine %d" % routine.line
         run.rows.sources[mark].add(ELSEWHERE)
-        run.state = ModalState(sources=frozenset([mark]), stop=Stop.MAYBE)
+        run.state = ModalState(sources=frozenset([mark]), stop=Waits.MAYBE)
         run.state.root_set, run.state.later_since = run.root_set, run.later_since
         run.state.later_speed, run.state.ended_later = run.later_speed, run.ended_later
         run.state.moved_later = run.moved_later

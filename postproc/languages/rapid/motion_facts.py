@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.evaluation import Evaluator
 from postproc.languages.rapid.instructions import (
     HALTING,
@@ -15,7 +16,7 @@ from postproc.languages.rapid.instructions import (
     sort_arguments,
     switch_value,
 )
-from postproc.languages.rapid.program_state import VARYING, ProgramState, Varying, Waits
+from postproc.languages.rapid.program_state import VARYING, ProgramState, Varying
 from postproc.languages.rapid.syntax_tree import Argument, Index, Instruction, Name, PlainMotions, Remark
 from postproc.languages.rapid.values import (
     Leaf,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from enum import IntEnum
 
+from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.syntax_tree import Remark
 from postproc.languages.rapid.values import UnknownData, Value, joined
 from postproc.toolpath import ArcFrame, OrientationMode
@@ -20,14 +21,6 @@ class Varying(IntEnum):
 
 
 VARYING = Varying.VARYING
-
-
-class Waits(IntEnum):
-    """Whether the program waits before the next motion, so that it cannot be planned ahead."""
-
-    NO = 0
-    MAYBE = 1
-    YES = 2
 
 
 @dataclass(slots=True)

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from postproc.languages.core.row_facts import SPEAKS
+from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.declared_data import DeclaredData, Usage, first_value, names_in, walk
 from postproc.languages.rapid.evaluation import Evaluator, Typed, is_component, unknown_record
 from postproc.languages.rapid.flow_graph import FlowGraph, Step
@@ -26,7 +27,7 @@ from postproc.languages.rapid.instructions import (
     is_motion,
 )
 from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read, override_of, waits_at
-from postproc.languages.rapid.program_state import ELSEWHERE, START, ProgramState, Waits
+from postproc.languages.rapid.program_state import ELSEWHERE, START, ProgramState
 from postproc.languages.rapid.routine_runner import RoutineRunner
 from postproc.languages.rapid.syntax_tree import (
     Argument,
@@ -156,8 +157,7 @@ class Propagation:
 
     def _leave_place(self, state: ProgramState) -> None:
         """What the file does not contain goes on, or nothing does."""
-        if state.waits != Waits.NO:
-            self.waited |= state.last
+        self.waited |= state.last if state.waits else set()
         state.last = frozenset([ELSEWHERE])
 
     def _routine(self, routine: RapidRoutine, state: ProgramState, recording: bool) -> ProgramState | None:

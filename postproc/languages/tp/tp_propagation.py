@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import NamedTuple
 
+from postproc.languages.core.waits import Waits
 from postproc.languages.tp.statement_flow import END, StatementFlow
 from postproc.languages.tp.tp_statements import (
     ConditionalStatement,
@@ -101,14 +102,6 @@ class TpState:
         if value is not None and abs(value) < 1e9:
             known[number] = value
         return replace(self, registers=tuple(sorted(known.items())))
-
-
-class Waits(IntEnum):
-    """Whether the program waits before the next motion, so that it cannot be planned ahead."""
-
-    NO = 0
-    MAYBE = 1
-    YES = 2
 
 
 class Reached(NamedTuple):

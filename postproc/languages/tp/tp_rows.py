@@ -6,6 +6,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats
 from postproc.base.document import Document
+from postproc.languages.core.waits import Waits
 from postproc.languages.tp.position_data import (
     CARTESIAN,
     EXTERNAL,
@@ -22,7 +23,6 @@ from postproc.languages.tp.tp_propagation import (
     START,
     TpPropagation,
     TpState,
-    Waits,
 )
 from postproc.languages.tp.tp_statements import PositionUse, StatementNotRead, TpMove, TpStatement
 from postproc.toolpath import LOST, FrameRef, Kind
