@@ -1,6 +1,6 @@
 """What effects that have no name may have done to the causes: their intervals consider them.
 
-An arm has gaps, loops and a base that gives way whether a part shows them or not.  What is too small to be named goes
+An arm has gaps, loops and a compliant base whether a part shows them or not.  What is too small to be named goes
 into forces and tool, and the covariance of the causes alone does not know of it.  As in orbit determination (B. D.
 Tapley, B. E. Schutz, G. H. Born: Statistical Orbit Determination, 2004, ch. 6, "consider" parameters) it is widened by
 what the effects may have moved,

@@ -49,20 +49,20 @@ def tool_error_lines(
     for number, error in sorted(tool_errors(result, cell, sides).items()):
         stated = cell.tool_errors.get(number, ToolError())
         known = {name: (getattr(stated, name), getattr(stated, f"{name}_ci95")) for name in SIZES}
-        told = {name for name, one in known.items() if one != (0.0, None)}
+        learnt = {name for name, one in known.items() if one != (0.0, None)}
         for cause, value, deviation in _measured(result, "tool"):
             if cause.place == f"tool {number}" and is_observed(cause, value, deviation):
                 known[cause.parameter] = cause.value + value, COVERAGE * deviation
-                told.add(cause.parameter)
+                learnt.add(cause.parameter)
                 observed = True
         words = []
         for name in SIZES:
             size, ci95 = known[name]
-            if name in told:
+            if name in learnt:
                 words.append(f"{name}: {size / MM:.5f}")
                 words += [] if ci95 is None else [f"{name}_ci95: {ci95 / MM:.5f}"]
         if words:
-            entries[number], walls[number] = words, error.walls if "radius" in told else {}
+            entries[number], walls[number] = words, error.walls if "radius" in learnt else {}
     if not observed:
         return b""
     names = {side: name for name, side in WALL_SIDES.items()}
