@@ -29,19 +29,14 @@ _codes: set[Any] = set()
 
 
 class ArrayPlace(Protocol):
-    """Where large arrays lie."""
+    """Where the pages of large arrays lie."""
 
     least: int
-    """Bytes of an array that belongs here."""
+    """Bytes of an array whose pages lie there."""
 
-    def new(self, size: int, zeros: bool) -> int:
-        """The address of ``size`` bytes, which are 0 if ``zeros``; 0 where there is no room for them."""
-
-    def size_at(self, address: int) -> int:
-        """Bytes of what is at ``address``; 0 where nothing of this place is."""
-
-    def give_back(self, address: int) -> bool:
-        """Whether something of this place was at ``address``, which is free from now on."""
+    def take_over(self, address: int, size: int, zeros: bool) -> bool:
+        """Put other pages in the place of ``size`` bytes at ``address``, which hold nothing yet or ``zeros``; memory
+        stays as it is where there is no room for them.  False where it is lost and must not be used."""
 
 
 class _Allocator(ctypes.Structure):
@@ -69,8 +64,12 @@ def set_handler(handler: Any) -> Any:
     return _set_handler()(None if handler is None else id(handler))
 
 
-def handler_for(place: ArrayPlace) -> Any:
-    """A handler that puts large arrays into ``place``, and all others where numpy puts them."""
+def handler_for(place: ArrayPlace, usable: Callable[[int], int]) -> Any:
+    """A handler that puts the pages of large arrays into ``place``; ``usable``: bytes at an address of the C library.
+
+    What is asked for comes from numpy's own functions, and goes back by them: they run while exceptions are on their
+    way, which a Python function would lose.
+    """
     before = set_handler(None)
     usual = _Handler.from_address(_address_in(set_handler(before), _NAME)).allocator
     # numpy's own functions expect the lock of the interpreter, which PYFUNCTYPE keeps
@@ -79,39 +78,35 @@ def handler_for(place: ArrayPlace) -> Any:
     realloc = ctypes.PYFUNCTYPE(*_REALLOC)(usual.realloc)
     free = ctypes.PYFUNCTYPE(*_FREE)(usual.free)
     # bound here: at the end of the process the names of modules may be gone before the last array
-    new, size_at, give_back, least, move = (
-        place.new,
-        place.size_at,
-        place.give_back,
-        place.least,
-        ctypes.memmove,
-    )
+    take_over, least, move = place.take_over, place.least, ctypes.memmove
 
     def allocate(_: int | None, size: int) -> int | None:
-        return (size >= least and new(size, False)) or malloc(None, size)
+        address: int | None = malloc(None, size)
+        if address and size >= least and not take_over(address, size, False):
+            return None
+        return address
 
     def allocate_zeros(_: int | None, count: int, size: int) -> int | None:
-        return (count * size >= least and new(count * size, True)) or calloc(None, count, size)
+        address: int | None = calloc(None, count, size)
+        if address and count * size >= least and not take_over(address, count * size, True):
+            return None
+        return address
 
     def change_size(_: int | None, address: int, size: int) -> int | None:
-        old = size_at(address)
-        if not old:
+        if not address or size < least:
             same: int | None = realloc(None, address, size)
             return same
         there = allocate(None, size)
-        if there is not None:
+        if there:
+            old = usable(address)
             move(there, address, min(size, old))
-            give_back(address)
+            free(None, address, old)
         return there
 
-    def release(_: int | None, address: int, size: int) -> None:
-        if not give_back(address):
-            free(None, address, size)
-
-    functions = (allocate, _MALLOC), (allocate_zeros, _CALLOC), (change_size, _REALLOC), (release, _FREE)
+    functions = (allocate, _MALLOC), (allocate_zeros, _CALLOC), (change_size, _REALLOC)
     calls = [ctypes.CFUNCTYPE(*types)(function) for function, types in functions]
     addresses = (ctypes.cast(call, ctypes.c_void_p).value for call in calls)
-    handler = _Handler(b"postproc_files", 1, _Allocator(None, *addresses))
+    handler = _Handler(b"postproc_files", 1, _Allocator(None, *addresses, usual.free))
     _codes.update(function.__code__ for function, _ in functions)
     _for_ever.append((handler, calls))
     return _new_capsule(ctypes.addressof(handler), _NAME, None)

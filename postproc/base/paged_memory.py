@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import mmap
 import os
+import re
 import signal
 import sys
 import tempfile
@@ -17,10 +18,10 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from itertools import chain
+from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import Any, TypeVar
+from typing import IO, Any, TypeVar
 
 from postproc.base.array_memory import handler_for, is_allocating, set_handler
 from postproc.base.findings import Code, Finding, Refusal, define
@@ -63,10 +64,12 @@ CODES = define(
 
 _PAGE = mmap.PAGESIZE
 _STEP = 16 * _PAGE
-_IS_MMAPPED = 2
-_MAP_FIXED = 0x10
+_LEAF = _PAGE * _PAGE // 8
+_HEAD, _IS_MMAPPED = 16, 2
+_MAP_FIXED, _PAGE_OUT = 0x10, 21
+_MMAP_THRESHOLD, _TRIM_THRESHOLD = -3, -1
 
-_libc = ctypes.CDLL(None) if sys.platform == "linux" else None
+_libc: Any = ctypes.CDLL(None) if sys.platform == "linux" else None
 
 current_storage: ContextVar[PagedStorage | None] = ContextVar("current_storage", default=None)
 
@@ -80,13 +83,16 @@ def large_arrays_in_files(*programs: Path) -> Iterator[None]:
     Raises Refusal FIL013 where neither the disk nor the memory has enough room.
     """
     size, folder = sum(map(_size, programs)), None
-    if sys.platform == "linux" and current_storage.get() is None and size >= PROGRAM:
+    if _has_pages_of_arrays() and current_storage.get() is None and size >= PROGRAM:
         folder = temporary_folder(ROOM * size, programs[0])
     if folder is None:
         yield
         return
+    # from LARGE on always, and not from the largest block on that was ever given back
+    _libc.mallopt(_MMAP_THRESHOLD, LARGE)
+    _libc.mallopt(_TRIM_THRESHOLD, 2 * LARGE)
     storage = PagedStorage(folder)
-    token, before = current_storage.set(storage), set_handler(handler_for(storage))
+    token, before = current_storage.set(storage), set_handler(handler_for(storage, _usable))
     try:
         with storage.watched():
             yield
@@ -122,76 +128,103 @@ def with_small_arrays(work: Callable[[Any], T], part: Any) -> T:
         set_handler(before)
 
 
+@dataclass(eq=False)
+class PageFile:
+    """A file without a name for the pages of one array after another.  ``address``: where they are or were last;
+    ``mapped`` [bytes] of them; ``key``: by which the system lists the file as mapped, empty: not known."""
+
+    stream: IO[bytes]
+    length: int
+    address: int = 0
+    mapped: int = 0
+    key: bytes = b""
+
+
 class PagedStorage:
-    """The temporary files of one run: one for each array, which ends with it."""
+    """The temporary files of one run.  What is in one is memory of the C library, which takes it back as always; a file
+    that is no longer mapped serves the next array."""
 
     def __init__(self, folder: str) -> None:
         self.folder, self.least = folder, LARGE
-        # by address; the second of a pair keeps the first open
-        self.files: dict[int, tuple[mmap.mmap, Any]] = {}
-        # by length
-        self.free: dict[int, list[tuple[mmap.mmap, Any]]] = {}
-        self.waiting = self.since = 0
-        self.moved: list[tuple[bytes, int, int]] = []
+        self.files: list[PageFile] = []
+        self.since = 0
 
-    def new(self, size: int, zeros: bool) -> int:
+    def take_over(self, address: int, size: int, zeros: bool) -> bool:
         """See ``ArrayPlace``."""
-        length = -(-size // _STEP) * _STEP
+        # the first page keeps the head by which the C library knows what is its own
+        start, length = address - _HEAD + _PAGE, _bytes_of_pages(address, size) - _PAGE
+        if length <= 0:
+            return True
         self.since += length
         if self.since > LOOK:
             self.release()
-        waiting = self.free.get(length)
-        if waiting:
-            file = waiting.pop()
-            self.waiting -= length
-            if zeros:
-                ctypes.memset(ctypes.addressof(file[1]), 0, size)
-        else:
-            try:
-                with tempfile.TemporaryFile(dir=self.folder, buffering=0) as stream:
-                    # a page for which the disk has no room later would end the process
-                    os.posix_fallocate(stream.fileno(), 0, length)
-                    mapped = mmap.mmap(stream.fileno(), length)
-            except OSError:
-                return 0
-            file = mapped, ctypes.c_char.from_buffer(mapped)
-        address = ctypes.addressof(file[1])
-        self.files[address] = file
-        return address
-
-    def size_at(self, address: int) -> int:
-        """See ``ArrayPlace``."""
-        return len(self.files[address][0]) if address in self.files else 0
-
-    def give_back(self, address: int) -> bool:
-        """See ``ArrayPlace``."""
-        file = self.files.pop(address, None)
+        file = self._file_of(length)
         if file is None:
+            return True
+        used = bool(file.address)
+        if not _map_over(start, length, file.stream):
             return False
-        length = len(file[0])
-        if self.waiting + length <= WAITING:
-            self.waiting += length
-            self.free.setdefault(length, []).append(file)
+        self._mapped(file, start, length)
+        if used and zeros:
+            ctypes.memset(start, 0, length)
         return True
 
     def move(self, text: bytes) -> None:
         """Puts a file with the same bytes in the place of the whole pages of ``text``."""
-        at = id(text) + bytes.__basicsize__ - 1
+        address = id(text)
+        at = address + bytes.__basicsize__ - 1
         start, stop = -(-at // _PAGE) * _PAGE, (at + len(text)) // _PAGE * _PAGE
-        if not _has_pages_of_its_own(text) or any(one is text for one, _, _ in self.moved):
+        mapped = any(file.address == start and file.key in _maps() for file in self.files)
+        if mapped or not _bytes_of_pages(address, sys.getsizeof(text)):
             return
+        file = self._file_of(stop - start)
+        if file is None:
+            return
+        rest = memoryview(text)[start - at : stop - at]
         try:
-            with tempfile.TemporaryFile(dir=self.folder, buffering=0) as stream:
-                os.posix_fallocate(stream.fileno(), 0, stop - start)
-                rest = memoryview(text)[start - at : stop - at]
-                while len(rest):
-                    rest = rest[stream.write(rest) :]
-                _map_over(start, stop - start, stream.fileno())
+            file.stream.seek(start % _LEAF)
+            while len(rest):
+                rest = rest[file.stream.write(rest) :]
         except OSError:
             return
-        # kept to its end: pages may be given back as long as nobody else can get their place
-        self.moved.append((text, start, stop - start))
+        if not _map_over(start, stop - start, file.stream):
+            raise MemoryError("a temporary file cannot take the place of memory")
+        self._mapped(file, start, stop - start)
         self.release()
+
+    def _file_of(self, length: int) -> PageFile | None:
+        """A file with room for ``length`` bytes that is not mapped; None where the disk has no room."""
+        length = -(-length // _STEP) * _STEP + _LEAF
+        maps, waiting, kept, found = _maps(), 0, [], None
+        for file in self.files:
+            if file.key in maps:
+                kept.append(file)
+            elif found is None and file.length == length:
+                found = file
+            elif waiting + file.length <= WAITING:
+                waiting += file.length
+                kept.append(file)
+            else:
+                file.stream.close()
+        self.files = kept
+        if found is not None:
+            return found
+        try:
+            stream = tempfile.TemporaryFile(dir=self.folder, buffering=0)  # noqa: SIM115  as long as it is mapped
+            # a page for which the disk has no room later would end the process
+            os.posix_fallocate(stream.fileno(), 0, length)
+        except OSError:
+            return None
+        return PageFile(stream, length)
+
+    def _mapped(self, file: PageFile, start: int, length: int) -> None:
+        """Notes where the pages of ``file`` are."""
+        file.address, file.mapped = start, length
+        if not file.key:
+            # the numbers that os.stat knows are others on some file systems
+            found = re.search(rb"(?m)^%x-\S+ \S+ \S+( \S+ \d+ )" % start, _maps())
+            file.key = found[1] if found else b""
+        self.files.append(file)
 
     def release(self) -> None:
         """See ``release_pages``.  The pages of a file keep what they hold."""
@@ -199,11 +232,9 @@ class PagedStorage:
         with open("/proc/self/statm", "rb") as stream:
             if int(stream.read().split()[2]) * _PAGE < RESIDENT:
                 return
-        for mapped, _ in chain(list(self.files.values()), *list(self.free.values())):
-            mapped.madvise(mmap.MADV_DONTNEED)
-        if _libc is not None:
-            for _, start, length in self.moved:
-                _libc.madvise(ctypes.c_void_p(start), ctypes.c_size_t(length), mmap.MADV_DONTNEED)
+        for file in list(self.files):
+            # loses nothing wherever it is: the array may be gone, and other memory be there
+            _libc.madvise(ctypes.c_void_p(file.address), ctypes.c_size_t(file.mapped), _PAGE_OUT)
 
     @contextmanager
     def watched(self) -> Iterator[None]:
@@ -242,34 +273,50 @@ class PagedStorage:
                 signal.raise_signal(number)
 
     def close(self) -> None:
-        """Keep nothing that is not asked for any more."""
-        self.moved.clear()
-        self.free.clear()
-        self.waiting = WAITING
+        """Keep nothing that is not asked for any more; what is mapped stays until its array ends."""
+        for file in self.files:
+            file.stream.close()
+        self.files.clear()
 
 
-def _has_pages_of_its_own(text: bytes) -> bool:
-    """Whether the C library (glibc) keeps ``text`` in a mapping of its own, which ends with it: such a block starts
-    with a page, and its head states 0, then its size in whole pages with one bit (malloc/malloc.c, IS_MMAPPED)."""
-    if not hasattr(_libc, "gnu_get_libc_version") or "PYTHONMALLOC" in os.environ or sys.flags.dev_mode:
-        return False
-    head = id(text) - 16
+def _has_pages_of_arrays() -> bool:
+    """Whether the C library is one (glibc) of which it is known how it keeps large blocks."""
+    return hasattr(_libc, "gnu_get_libc_version")
+
+
+def _usable(address: int) -> int:
+    """Bytes of the block at ``address``."""
+    function = _libc.malloc_usable_size
+    function.restype, function.argtypes = ctypes.c_size_t, (ctypes.c_void_p,)
+    return int(function(address))
+
+
+def _maps() -> bytes:
+    with open("/proc/self/maps", "rb") as stream:
+        return stream.read()
+
+
+def _bytes_of_pages(address: int, size: int) -> int:
+    """The bytes of the pages, from the one with ``address`` on, that the C library (glibc) keeps for it alone, 0 where
+    it does not: such a block starts with a page, and its head states 0, then its size in whole pages with one bit
+    (malloc/malloc.c, IS_MMAPPED)."""
+    head = address - _HEAD
     if head % _PAGE:
-        return False
-    zero, size = (ctypes.c_size_t * 2).from_address(head)
-    return zero == 0 and size % _PAGE == _IS_MMAPPED and 0 <= size - len(text) < 2 * _PAGE
+        return 0
+    zero, length = (ctypes.c_size_t * 2).from_address(head)
+    length -= _IS_MMAPPED
+    return length if zero == 0 and length % _PAGE == 0 and 0 <= length - size < 2 * _PAGE else 0
 
 
-def _map_over(address: int, length: int, file: int) -> None:
-    """Puts the first ``length`` bytes of an open ``file`` in the place of the pages from ``address``."""
-    if _libc is None:
-        return
+def _map_over(address: int, length: int, file: IO[bytes]) -> bool:
+    """Puts ``length`` bytes of ``file`` in the place of the pages at ``address``; False where that failed, and they
+    must not be used.  They begin in the file as far behind a leaf as in memory: groups of pages that lie across two
+    leaves would never be given back."""
     function = _libc.mmap
     function.restype = ctypes.c_void_p
     function.argtypes = (ctypes.c_void_p, ctypes.c_size_t, *(ctypes.c_int,) * 3, ctypes.c_long)
-    access = mmap.PROT_READ | mmap.PROT_WRITE
-    if function(address, length, access, mmap.MAP_SHARED | _MAP_FIXED, file, 0) != address:
-        raise MemoryError("a temporary file cannot take the place of memory")
+    access, flags = mmap.PROT_READ | mmap.PROT_WRITE, mmap.MAP_SHARED | _MAP_FIXED
+    return bool(function(address, length, access, flags, file.fileno(), address % _LEAF) == address)
 
 
 def _handlers() -> dict[int, Callable[[int, FrameType | None], Any]]:

@@ -32,6 +32,13 @@ from postproc.workflows.preparation import Prepared, Request, prepare, read_prog
 PROBE = 1 * DEG
 """Turn of the part by which forces in world axes are distinguished from others."""
 
+SENSES = 4
+"""Senses in which the forces are turned for the mean over their interval, beside the stated ones."""
+
+AVERAGED = np.sqrt(2.0 * (SENSES + 1) / SENSES) / 1.96
+"""Turn of those forces in half widths of the interval: their mean square about each of the two axes across the force,
+with the stated ones in the mean, is that of a normal one whose 95 % interval the direction's is."""
+
 
 @dataclass(frozen=True)
 class PlaceRequest:
@@ -228,7 +235,7 @@ def _scoring(request: PlaceRequest, prepared: tuple[Prepared, ...], motions: Par
     direction = stated_direction(ready, request) * DEG
     sets = [motions.force[None]]
     if direction > 0:
-        sets.append(turned_forces(motions.force, direction, 4))
+        sets.append(turned_forces(motions.force, direction * AVERAGED, SENSES))
     unloaded = not ready.task.process and not ready.task.model.zero_without_load
     return Scoring(
         request.objective,

@@ -57,12 +57,15 @@ def on_mujoco(ready: Prepared, most: int = 200) -> float:
     return largest
 
 
-def regrets(name: str, chosen: list[np.ndarray], others: np.ndarray, draws: int) -> np.ndarray:
-    """(len(chosen), draws) the regret of each place under each draw, over the feasible ones of many places: all over
-    the room, and around ``others`` (Q, 6).  Places between them may be better: the real regret is no less."""
+def regrets(
+    name: str, chosen: list[np.ndarray], others: np.ndarray, draws: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """(len(chosen), draws) the error across the feed [m] and the regret of each place under each draw, over the
+    feasible ones of many places: all over the room, and around ``others`` (Q, 6).  Places between them may be better:
+    the real regret is no less."""
     problem = place_problem(asked(name))
     few = np.unique(np.linspace(0, len(problem.motions) - 1, 60).round().astype(int))
-    few = problem.motions.with_heads(np.union1d(few, np.flatnonzero(problem.motions.scored)[::30]))
+    few = problem.motions.with_heads(np.union1d(few, np.flatnonzero(problem.motions.scored)))
     part, scoring = problem.motions.take(few), problem.scoring.take(few)
     room, rng = problem.room, np.random.default_rng(SEED)
     rough = score_places(problem.model, part, room, scoring, start_places(room))
@@ -84,8 +87,9 @@ def regrets(name: str, chosen: list[np.ndarray], others: np.ndarray, draws: int)
         drawn = replace(scoring, forces=force[None])
         scores = score_places(problem.model.with_values(values), part, problem.room, drawn, pool)
         value = scores.value
-        found.append(value[: len(chosen)] / value.min() - 1.0)
-    return np.array(found).T
+        found.append((value[: len(chosen)], value[: len(chosen)] / value.min() - 1.0))
+    errors, shares = zip(*found, strict=True)
+    return np.array(errors).T, np.array(shares).T
 
 
 def run(name: str, grid: int, draws: int) -> None:
@@ -114,9 +118,10 @@ def run(name: str, grid: int, draws: int) -> None:
         wide = place(asked(name, direction=20.0))
         others = np.array([one.place for one in (*done.places, *wide.places)])
         found = regrets(name, [done.best.place, wide.best.place], others, draws)
-        for word, each in zip(("stated force", "mean over directions"), found, strict=True):
+        for word, error, each in zip(("stated force", "mean over directions"), *found, strict=True):
             figures = f"median {np.median(each):.1%}, worst {each.max():.1%}"
-            print(f"  regret of {draws} draws at least, chosen by {word}: {figures}", flush=True)
+            error_text = f"error {error.mean() * 1e3:.4f} mm in the mean, {error.max() * 1e3:.4f} at worst"
+            print(f"  {draws} draws, chosen by {word}: regret at least {figures}; {error_text}", flush=True)
 
 
 def main() -> None:
