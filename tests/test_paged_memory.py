@@ -23,6 +23,7 @@ from postproc import api
 from postproc.base import batches, geometry, paged_memory
 from postproc.base.array_storage import ArrayStore, GrowingColumns
 from postproc.base.findings import Refusal
+from postproc.base.sized_bytes import SizedBytes
 from postproc.languages.core import plan_rows
 from postproc.languages.krl import dependent_targets, inserting, motion_table, writer
 from postproc.languages.rapid import module_toolpath
@@ -216,19 +217,24 @@ def test_an_error_is_heard_while_an_array_goes_back(work, error, small):
         work()
 
 
-def test_bytes_move_into_a_file_and_stay_what_they_are(small):
-    size = 40 << 20  # the C library keeps what is so large in a mapping of its own
-    text = bytes(range(256)) * (size // 256)
-    copy = bytearray(text)
+def test_bytes_lie_in_a_file_before_they_are_written(small):
+    parts = [bytes([k % 251]) * (k + 1) for k in range(2000)]
     with paged_memory.large_arrays_in_files(Path(__file__)):
-        assert paged_memory.in_file(text) is text
-        storage = paged_memory.current_storage.get()
-        assert "deleted" in pages_at(id(text))
+        text = SizedBytes(sum(map(len, parts)))
+        text.write_all(parts)
+        written = text.done()
+        assert "deleted" in pages_at(id(written))
         paged_memory.release_pages()
-        assert text == copy
-        assert paged_memory.in_file(text) is text
-        assert len(storage.files) == 1
-    assert text == copy
+        assert written == b"".join(parts)
+    assert written == b"".join(parts)
+    assert hash(written) == hash(b"".join(parts))
+
+
+@pytest.mark.parametrize("size", [0, 1, 3, 4, 7])
+def test_bytes_of_another_number_than_was_stated(size):
+    text = SizedBytes(size)
+    text.write_all([b"ab", b"", b"cd"])
+    assert text.done() == b"abcd"
 
 
 def test_a_small_program_stays_in_memory(tmp_path):

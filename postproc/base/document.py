@@ -8,7 +8,6 @@ edits are stored as arrays, and spliced and taken out again in blocks.
 from __future__ import annotations
 
 import hashlib
-import io
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 
 from postproc.base.array_storage import ArrayStore
 from postproc.base.arrays import Ints, sums
-from postproc.base.paged_memory import in_file
+from postproc.base.sized_bytes import SizedBytes
 
 Offsets = NDArray[np.signedinteger]
 """Byte offsets; 32 bits where they fit."""
@@ -143,7 +142,7 @@ class Edits(Sequence[Edit]):
         columns = _in_columns(chain((first, second), rest))
         del first, second
         edits = Edits.__new__(Edits)
-        edits.texts = in_file(b"".join([column.data for column in columns.pop()]))
+        edits.texts = _joined(columns.pop())
         edits.ends = sums(np.concatenate(columns.pop()), offset_type(len(edits.texts)))
         edits.stop = np.concatenate(columns.pop())
         edits.start = np.concatenate(columns.pop())
@@ -235,22 +234,19 @@ def _rearranged(texts: bytes, ends: NDArray[Any], order: Ints) -> tuple[bytes, O
     """Texts in another order, and their new ends; those that stay together are taken together."""
     arranged = sums(np.diff(ends)[order], offset_type(len(texts)))
     runs = np.concatenate([[0], np.flatnonzero(np.diff(order) != 1) + 1, [len(order)]])
-    rearranged, view = _sized(len(texts)), memoryview(texts)
+    rearranged, view = SizedBytes(len(texts)), memoryview(texts)
     for low in range(0, len(runs) - 1, BLOCK // 8):
         bounds = runs[low : low + BLOCK // 8 + 1]
         first, last = ends[order[bounds[:-1]]], ends[order[bounds[1:] - 1] + 1]
-        rearranged.writelines(view[a:b] for a, b in zip(first.tolist(), last.tolist(), strict=True))
-    return in_file(rearranged.getvalue()), arranged
+        rearranged.write_all(view[a:b] for a, b in zip(first.tolist(), last.tolist(), strict=True))
+    return rearranged.done(), arranged
 
 
-def _sized(size: int) -> io.BytesIO:
-    """A buffer that is as large from the start on: one that grows is there twice at times."""
-    buffer = io.BytesIO()
-    if size:
-        buffer.seek(size - 1)
-        buffer.write(b"\0")
-        buffer.seek(0)
-    return buffer
+def _joined(parts: list[NDArray[Any]]) -> bytes:
+    """The bytes of all parts, (B_k,) each."""
+    text = SizedBytes(sum(map(len, parts)))
+    text.write_all(part.data for part in parts)
+    return text.done()
 
 
 def gathered(source: bytes | NDArray[np.uint8], start: NDArray[Any], lengths: NDArray[Any]) -> bytes:
@@ -282,7 +278,7 @@ def apply(document: Document, edits: Iterable[Edit]) -> bytes:
     growth = int(all_edits.ends[-1]) - int(
         all_edits.stop.sum(dtype=np.int64) - all_edits.start.sum(dtype=np.int64)
     )
-    written, at = _sized(len(raw) + growth), 0
+    written, at = SizedBytes(len(raw) + growth), 0
     for low, high in _blocks(all_edits):
         block_start, block_end = int(all_edits.start[low]), int(all_edits.stop[high - 1])
         written.write(memoryview(raw)[at:block_start])
@@ -294,7 +290,7 @@ def apply(document: Document, edits: Iterable[Edit]) -> bytes:
         )
         at = block_end
     written.write(memoryview(raw)[at:])
-    return in_file(written.getvalue())
+    return written.done()
 
 
 def _disorder(edits: Edits, size: int) -> int:

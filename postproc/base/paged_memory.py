@@ -35,7 +35,7 @@ LARGE = 8 << 20
 """Bytes of an array, or of a byte string, that is in a file."""
 
 RESIDENT = 256 << 20
-"""Bytes of files that may be resident before all of them are given back."""
+"""Bytes of files that may be resident before all of them are given back: twice as many bring no time."""
 
 WAITING = 256 << 20
 """Bytes of files that are free and wait for the next array of their size: a new one takes longer to fill."""
@@ -102,12 +102,17 @@ def large_arrays_in_files(*programs: Path) -> Iterator[None]:
         storage.close()
 
 
-def in_file(text: bytes) -> bytes:
-    """The very ``text``; if it is large its pages are those of a temporary file from now on."""
+def room_in_file(text: bytes) -> None:
+    """Bytes that hold nothing yet: if there are many, their pages are those of a temporary file from now on.
+
+    Raises MemoryError where the pages are lost."""
     storage = current_storage.get()
-    if storage is not None and len(text) >= LARGE:
-        storage.move(text)
-    return text
+    if (
+        storage is not None
+        and len(text) >= LARGE
+        and not storage.take_over(id(text), sys.getsizeof(text), False)
+    ):
+        raise MemoryError("a temporary file cannot take the place of memory")
 
 
 def release_pages() -> None:
@@ -161,36 +166,17 @@ class PagedStorage:
         file = self._file_of(length)
         if file is None:
             return True
-        used = bool(file.address)
         if not _map_over(start, length, file.stream):
             return False
-        self._mapped(file, start, length)
-        if used and zeros:
+        if zeros and file.address:
             ctypes.memset(start, 0, length)
+        file.address, file.mapped = start, length
+        if not file.key:
+            # the numbers that os.stat knows are others on some file systems
+            found = re.search(rb"(?m)^%x-\S+ \S+ \S+( \S+ \d+ )" % start, _maps())
+            file.key = found[1] if found else b""
+        self.files.append(file)
         return True
-
-    def move(self, text: bytes) -> None:
-        """Puts a file with the same bytes in the place of the whole pages of ``text``."""
-        address = id(text)
-        at = address + bytes.__basicsize__ - 1
-        start, stop = -(-at // _PAGE) * _PAGE, (at + len(text)) // _PAGE * _PAGE
-        mapped = any(file.address == start and file.key in _maps() for file in self.files)
-        if mapped or not _bytes_of_pages(address, sys.getsizeof(text)):
-            return
-        file = self._file_of(stop - start)
-        if file is None:
-            return
-        rest = memoryview(text)[start - at : stop - at]
-        try:
-            file.stream.seek(start % _LEAF)
-            while len(rest):
-                rest = rest[file.stream.write(rest) :]
-        except OSError:
-            return
-        if not _map_over(start, stop - start, file.stream):
-            raise MemoryError("a temporary file cannot take the place of memory")
-        self._mapped(file, start, stop - start)
-        self.release()
 
     def _file_of(self, length: int) -> PageFile | None:
         """A file with room for ``length`` bytes that is not mapped; None where the disk has no room."""
@@ -216,15 +202,6 @@ class PagedStorage:
         except OSError:
             return None
         return PageFile(stream, length)
-
-    def _mapped(self, file: PageFile, start: int, length: int) -> None:
-        """Notes where the pages of ``file`` are."""
-        file.address, file.mapped = start, length
-        if not file.key:
-            # the numbers that os.stat knows are others on some file systems
-            found = re.search(rb"(?m)^%x-\S+ \S+ \S+( \S+ \d+ )" % start, _maps())
-            file.key = found[1] if found else b""
-        self.files.append(file)
 
     def release(self) -> None:
         """See ``release_pages``.  The pages of a file keep what they hold."""

@@ -11,7 +11,7 @@ from typing import BinaryIO
 
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import note, provided_content
-from postproc.base.paged_memory import in_file
+from postproc.base.sized_bytes import SizedBytes
 
 MAX_BYTES = 1_000_000_000
 """Sixteen million motions; offsets in a program have 32 bits."""
@@ -27,8 +27,8 @@ def read_file(path: Path, most: int | None = None) -> bytes:
     FIL001: not readable, a pipe or a device, larger than ``MAX_BYTES``; FIL010: not what it was when last read.
     """
     if most is None:
-        return _read(path, MAX_BYTES, lambda stream: stream.read())
-    return _read(path, None, lambda stream: stream.read(most + 1))
+        return _read(path, MAX_BYTES, _whole)
+    return _read(path, None, lambda stream, _: stream.read(most + 1))
 
 
 def read_text_file(path: Path, code: str = "FIL003", ends: tuple[bytes, ...] = (b"\n",)) -> bytes:
@@ -37,7 +37,7 @@ def read_text_file(path: Path, code: str = "FIL003", ends: tuple[bytes, ...] = (
     ``ends``: what a line may end with, each of one byte.  Raises Refusal as ``read_file`` does; FIL003: a NUL;
     ``code``: a line of more than ``MAX_LINE`` bytes.
     """
-    return _read(path, MAX_BYTES, lambda stream: _text(stream, path, code, ends))
+    return _read(path, MAX_BYTES, lambda stream, size: _text(stream, size, path, code, ends))
 
 
 def list_folder(folder: Path) -> list[Path]:
@@ -61,10 +61,10 @@ def note_listing(folder: Path, suffix: str) -> None:
     sys.audit("open", str(folder / f"*{suffix}"), "r", 0)
 
 
-def _read(path: Path, largest: int | None, take: Callable[[BinaryIO], bytes]) -> bytes:
+def _read(path: Path, largest: int | None, take: Callable[[BinaryIO, int], bytes]) -> bytes:
     given = provided_content(path)
     if given is not None:
-        raw = take(io.BytesIO(given))
+        raw = take(io.BytesIO(given), len(given))
         note(path, raw)
         return raw
     try:
@@ -74,7 +74,7 @@ def _read(path: Path, largest: int | None, take: Callable[[BinaryIO], bytes]) ->
         if largest is not None and status.st_size > largest:
             raise OSError(f"it is larger than {largest} bytes")
         with path.open("rb") as stream:
-            raw = in_file(take(stream))
+            raw = take(stream, status.st_size)
     except (OSError, ValueError) as error:  # ValueError: a name with NUL
         why = getattr(error, "strerror", None) or error
         raise Refusal(Finding("FIL001", f"the file cannot be read: {why}", str(path))) from None
@@ -82,23 +82,30 @@ def _read(path: Path, largest: int | None, take: Callable[[BinaryIO], bytes]) ->
     return raw
 
 
-def _text(stream: BinaryIO, path: Path, code: str, ends: tuple[bytes, ...]) -> bytes:
-    text = io.BytesIO()  # gives its bytes without a copy
+def _whole(stream: BinaryIO, size: int) -> bytes:
+    text = SizedBytes(size)
+    while block := stream.read(MAX_LINE):
+        text.write(block)
+    return text.done()
+
+
+def _text(stream: BinaryIO, size: int, path: Path, code: str, ends: tuple[bytes, ...]) -> bytes:
+    text = SizedBytes(size)
     line_bytes = 0  # bytes of the line that a block starts in the midst of
     while block := stream.read(MAX_LINE):
         nul = block.find(b"\0")
         if nul >= 0:
-            raise Refusal(_no_text(text.getvalue() + block, path))
+            raise Refusal(_no_text(text.done() + block, path))
         line_ends = [(block.find(end), block.rfind(end)) for end in ends if end in block]
         line_bytes += min((first for first, _ in line_ends), default=len(block))
         if line_bytes > MAX_LINE:
-            number = _line(text.getvalue(), ends)
+            number = _line(text.done(), ends)
             message = f"the line has more than {MAX_LINE} bytes: the file is not plain text"
             raise Refusal(Finding(code, message, str(path), number))
         if line_ends:
             line_bytes = len(block) - 1 - max(last for _, last in line_ends)
         text.write(block)
-    return text.getvalue()
+    return text.done()
 
 
 def _no_text(raw: bytes, path: Path) -> Finding:

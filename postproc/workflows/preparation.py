@@ -125,7 +125,8 @@ def read_program(
     ``config_dat``: instead of the cell's; ``beside``: the folder of what it calls, where that is not its own.
     Raises Refusal FIL001, FIL002, FIL003, YML004.
     """
-    if not (main := read_document(path)).raw.strip():
+    main = read_document(path)
+    if not main.raw or main.raw.isspace():
         raise Refusal(Finding("FIL002", "the file is empty", str(path)))
     dialect = _dialect(path, main.raw, cell)
     companions = dialect.companions(path)

@@ -323,11 +323,10 @@ def _sharing(of: Ints, file: NDArray[np.int8], start: NDArray[Any]) -> Iterable[
 
 def _finder(rows: MotionRows, table: MotionTable) -> Callable[[int, str, str], Finding]:
     raw, name = rows.document.raw, str(rows.document.path)
-    words, lines = table.word.tolist(), table.line.tolist()
 
     def finding(row: int, code: str, message: str) -> Finding:
-        at = words[row]
-        return Finding(code, message, name, lines[row], at - raw.rfind(b"\n", 0, at))
+        at = int(table.word[row])
+        return Finding(code, message, name, int(table.line[row]), at - raw.rfind(b"\n", 0, at))
 
     return finding
 
@@ -385,11 +384,10 @@ def _pinned(rows: MotionRows, table: MotionTable, refused: dict[int, Finding]) -
         return pins
     finding = _finder(rows, table)
     every = range(len(rows))
-    lines = table.line.tolist()
     seen: set[Source] = set()
     for row in rows.builds_on:
         if row in refused:
-            message = f"the motion in line {lines[row]} depends on this end point and is not corrected"
+            message = f"the motion in line {table.line[row]} depends on this end point and is not corrected"
             for pin in _among(every, expanded(rows, rows.builds_on[row], seen)):
                 pins.setdefault(pin, finding(pin, rows.reasons[row].code, message))
     seen = set()
