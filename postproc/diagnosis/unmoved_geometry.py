@@ -12,7 +12,7 @@ from postproc.base.arrays import Floats
 from postproc.diagnosis.selection import basis_of, outside
 from postproc.identification.fit import Fit, fit
 from postproc.identification.least_squares import scales
-from postproc.identification.unknowns import PLAUSIBLE, Unknown
+from postproc.identification.unknowns import Unknown
 
 LEAST = 4.0
 """Variances of a reading that a parameter must at least explain; of many that are tried, 2 ln(how many): the risk
@@ -32,7 +32,7 @@ def restore_unmoved_geometry(fitted: Fit) -> Fit:
     """
     from scipy.special import chdtri
 
-    places = [k for k, u in enumerate(fitted.unknowns) if _effect(u) in PLAUSIBLE and not u.fixed]
+    places = [k for k, u in enumerate(fitted.unknowns) if u.plausible is not None and not u.fixed]
     if len(places) < 2:
         return fitted
     own = [fitted.unknowns[k] for k in places]
@@ -61,10 +61,6 @@ def _covariance(found: Fit, fitted: Fit) -> Floats:
     covariance = np.diag(np.diag(found.covariance))
     covariance[np.ix_(here, here)] = fitted.covariance[np.ix_(there, there)]
     return covariance
-
-
-def _effect(unknown: Unknown) -> str:
-    return unknown.name.partition(".")[0].partition(" ")[0]
 
 
 def _before(unknown: Unknown) -> float:

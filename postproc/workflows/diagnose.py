@@ -65,6 +65,10 @@ WIDER = 0.05
 CANDIDATES = 300
 """Poses to choose from."""
 
+SPREAD = 0.15
+"""Share of the ranges of the axes, in the mean, by which two proposed poses differ at least: what is repeated at one
+pose repeats its errors too.  Of two random poses it is a third."""
+
 
 @dataclass(frozen=True)
 class DiagnoseRequest:
@@ -330,6 +334,7 @@ def _offer(request: DiagnoseRequest, measured: Measured, base: Fit) -> Candidate
         tracker=None,
         cone=np.pi,
         spacing=5 * DEG,
+        spread=SPREAD,
     )
 
 
