@@ -16,7 +16,7 @@ from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patte
 from postproc.diagnosis.sample import sample_of
 from postproc.diagnosis.search import model_unknowns, search
 from postproc.diagnosis.search_result import Search
-from postproc.diagnosis.unmoved_geometry import restore_unmoved_geometry
+from postproc.diagnosis.unmoved_parameters import restore_unmoved_parameters
 from postproc.diagnosis.unstated_geometry import take_in_unstated_geometry
 from postproc.diagnosis.verdict import (
     ONLY_TOGETHER,
@@ -128,7 +128,7 @@ def diagnose(
                 final, disagreement, agreed = base, (), False
     before, every = {u.key for u in final.unknowns}, take_in_unstated_geometry(final)
     additional = {u.key for u in every.unknowns} - before
-    final = restore_unmoved_geometry(every)
+    final = restore_unmoved_parameters(every)
     # where an effect is missing in a model its own parameters compensate for that
     moved = refitted(final, additional) if verdict.word not in ("ambiguous", "unknown") else ()
     final = cover_equivalent_models(final, every, result.base, names)

@@ -132,6 +132,6 @@ def random_choice(choices: CandidateSet, count: int, rng: np.random.Generator) -
     for setup in rng.permutation(len(choices.q)).tolist():
         if len(chosen) == count:
             break
-        if not any((np.abs(choices.q[setup] - choices.q[other]) < choices.spacing).all() for other in chosen):
+        if not choices.near(setup)[chosen].any():
             chosen.append(setup)
     return chosen

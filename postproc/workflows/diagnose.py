@@ -236,11 +236,12 @@ def _next_poses(request: DiagnoseRequest, measured: Measured, diagnosis: Diagnos
     if measured.readings.deflection and not len(offer.loads) + len(offer.pulls):
         return None  # what can be hung or pulled with is not known
     pairs = [(first, other) for first, *others in diagnosis.verdict.alternatives for other in others[:TRIED]]
-    for offered in (narrow, offer):
+    # poses that differ less are better than none
+    for offered in (narrow, offer, replace(offer, spread=0.0)):
         tried = [_discriminating_poses(measured, diagnosis, offered, one, other) for one, other in pairs]
         plans = [plan for plan in tried if plan]
         best = max(plans, key=lambda plan: min(plan.separation), default=None)
-        if best is not None and (min(best.separation) >= SETTLES or offered is offer):
+        if best is not None and (min(best.separation) >= SETTLES or offered is not narrow):
             return replace(best, beyond=_beyond(measured, best, narrow.limits))
     return None
 
