@@ -16,10 +16,10 @@ from postproc.identification.campaign import Campaign
 from postproc.identification.fit import fit
 
 
-def fitted(off, seed=1, sigma=2e-5):
+def fitted(off, seed=1, sigma=2e-5, weights=False):
     """A file that states all of its geometry, its fit to readings of an arm whose parameters are ``off`` (SI), and that
     arm."""
-    model = model_of(robot_file(True, False))
+    model = model_of(robot_file(True, weights))
     design = replace(campaign(np.random.default_rng(seed), 30, stated=True), jitter=0.0)
     rng = np.random.default_rng(seed)
     empty = Campaign(measured.readings(design, np.zeros((len(design.q) * design.points, 3)), sigma))
@@ -77,6 +77,15 @@ def test_a_geometry_that_is_off_everywhere_is_fitted_everywhere():
 def test_nothing_moves_where_nothing_is_off():
     model, every, _ = fitted({})
     assert moved(model, restore_unmoved_parameters(every)) == set()
+
+
+def test_compliances_and_weights_that_are_as_stated_stay():
+    model, every, _ = fitted({"link_geometry.dx4": 2e-4}, weights=True)
+    assert {"joint_compliance.c2", "link_gravity.mx2"} <= moved(model, every)
+    found = moved(model, restore_unmoved_parameters(every))
+    # of forty that are tried one or the other explains its price by chance
+    assert "link_geometry.dx4" in found
+    assert len(found) < len(moved(model, every)) / 4
 
 
 @pytest.mark.parametrize("clusters", [8, 15, 200])

@@ -23,8 +23,8 @@ TOGETHER = 0.05
 
 
 def restore_unmoved_parameters(fitted: Fit) -> Fit:
-    """The fit with those parameters alone, of geometry and of what the robot file states, that the readings ask for, the
-    others as stated or at their null.
+    """The fit with those parameters alone, of geometry and of what the robot file states, that the readings ask for,
+    the others as stated or at their null.
 
     Parameters are taken in one after the other, that first which explains most beside what is in already; then those
     that the others make unnecessary leave again.  Intervals stay those of the fit of all: they hold what the others may

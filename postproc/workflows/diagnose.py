@@ -182,6 +182,7 @@ def _validated(path: Path, measured: Measured, diagnosis: Diagnosis) -> Validate
         readings = replace(readings, direction=np.zeros_like(readings.q))
     campaign = Campaign(readings, measured.campaign.stated_tool)
     check_numbers(readings, (), measured.model)
+    check_fit(campaign, diagnosis.final.model, ())
     done = validated(diagnosis.stated, diagnosis.final, campaign)
     known = np.isfinite(readings.value)
     before, after = (Sizes.of(lengths_of(one, known)) for one in (done.before, done.after))
