@@ -260,14 +260,28 @@ def test_tables_count_every_run(tmp_path):
 def test_intervals_are_counted_by_row_and_kind_of_parameter():
     inside, outside_, unknown = ([True, held, 1.0, 0.1, 1.0, 1.0] for held in (True, False, None))
     records = [
-        {"row": "pair", "covered": {"payload.mass": inside, "joint_offset.o2": outside_}},
-        {"row": "single", "covered": {"joint_offset.o3": inside, "joint_offset.o4": unknown}},
-        {"row": "single", "covered": None},
+        {"key": "1", "row": "pair", "covered": {"payload.mass": inside, "joint_offset.o2": outside_}},
+        {"key": "2", "row": "single", "covered": {"joint_offset.o3": inside, "joint_offset.o4": unknown}},
+        {"key": "3", "row": "single", "covered": None},
     ]
     counted = {line.split(",")[1].split()[0]: line.split()[5:8] for line in table.of_intervals(records)}
     assert counted["joint_offset"] == ["1", "of", "2"]
     assert counted["pair"] == ["1", "of", "2"]
     assert counted["single"] == counted["payload"] == ["1", "of", "1"]
+
+
+def test_what_goes_together_in_a_run_counts_as_one():
+    """200 runs of twenty values each: independent ones count all, those that agree within a run as 200."""
+    rng = np.random.default_rng(3)
+    alone = [rng.random(20) < 0.9 for _ in range(200)]
+    together = [[held] * 20 for held in rng.random(200) < 0.9]
+    widths = []
+    for runs in (alone, together):
+        told = table.share_of_runs([[bool(held) for held in one] for one in runs])
+        low, high = (float(word) for word in told.partition("(")[2].rstrip(")").split(" .. "))
+        widths.append(high - low)
+    assert widths[0] == pytest.approx(2 * 196 * np.sqrt(0.09 / 4000), rel=0.2)
+    assert widths[1] == pytest.approx(2 * 196 * np.sqrt(0.09 / 200), rel=0.2)
 
 
 def test_what_was_run_is_not_run_again(tmp_path):

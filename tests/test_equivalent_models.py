@@ -34,12 +34,12 @@ def deviations(seed):
     rng = np.random.default_rng(seed)
     full = model_of(robot_file(True, False))
     names = [
-        (i, p, t.effect.name)
+        (i, p.name, PLAUSIBLE[t.effect.name][p.unit])
         for i, t in enumerate(full.terms)
-        for p in t.values
+        for p in t.effect.parameters
         if t.effect.name in PLAUSIBLE
     ]
-    off = {(i, p): PLAUSIBLE[effect] * rng.normal() for i, p, effect in names}
+    off = {(i, p): size * rng.normal() for i, p, size in names}
     design = replace(campaign(rng, 30, stated=True), jitter=0.0)
     seen = read(design, full.with_values(off), rng)
     model = model_of(robot_file(True, False, [("joint_offset", "A3")]))

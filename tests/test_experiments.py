@@ -215,6 +215,20 @@ def test_chosen_setups_are_distinct_enough(seed):
             assert (np.abs(choices.q[one] - choices.q[other]) >= choices.spacing).any()
 
 
+@settings(max_examples=examples(10), deadline=None)
+@given(st.integers(0, 10_000))
+def test_chosen_setups_are_spread(seed):
+    """The differences of all axes together, each as a share, are one at least."""
+    choices = replace(some_choices(seed), spread=np.array([0.9, 1.8]))
+    for criterion in criteria():
+        chosen, _ = exchanged(choices, criterion, grown(choices, criterion, (), 4))
+        random = random_choice(choices, 4, np.random.default_rng(seed))
+        assert len(chosen) > 1
+        for several in (chosen, random):
+            for one, other in combinations(several, 2):
+                assert (np.abs(choices.q[one] - choices.q[other]) / choices.spread).sum() >= 1.0
+
+
 def test_a_setup_is_exchanged_for_a_better_one_beside_it():
     """Spacing holds between chosen setups, not between one and what takes its place."""
     choices = some_choices(3, spacing=5.0)

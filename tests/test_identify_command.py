@@ -13,7 +13,7 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import Poses
 from postproc.cli.main import COMMANDS
 from postproc.identification.campaign import Campaign
-from postproc.measurements import measurements_csv, planned
+from postproc.measurements import measurements_csv, planned, read_measurements
 from postproc.model import StiffnessModel
 from postproc.robot.description import find_robot, load_robot
 from postproc.workflows import identify as workflow
@@ -191,6 +191,28 @@ def test_all_found(compensate, loads):
     assert done.code == 0, done.out
     assert done.out.startswith("The parameter was found.")
     assert compensate(*words, "-q").out == ""
+
+
+def test_a_file_to_validate_with_is_checked_as_the_others(compensate, loads, tmp_path):
+    readings = read_measurements(loads, [(f"A{k}", False) for k in range(1, 7)])
+    wrong, new = tmp_path / "metres.csv", tmp_path / "new.yaml"
+    wrong.write_bytes(measurements_csv(replace(readings, value=readings.value / 1e3)))
+    done = compensate(
+        "identify",
+        loads,
+        "--effects",
+        "joint_compliance.c5",
+        "--bootstrap",
+        "0",
+        "--validate",
+        wrong,
+        "-o",
+        new,
+    )
+    assert done.code == 1, done.out
+    assert "metres.csv" in done.err
+    assert "in metres" in done.err
+    assert not new.exists()
 
 
 def test_what_can_not_be_done(compensate, loads, tmp_path, monkeypatch):

@@ -234,6 +234,16 @@ def test_readings_of_another_robot_are_told_and_not_explained():
     assert "% of the deflections remain" in finding.message
 
 
+@pytest.mark.parametrize("place", [0.0, 1.25])
+def test_one_place_for_all_poses_is_no_measurement(place):
+    readings, asked = good("tracker")
+    still = replace(readings, value=np.full_like(readings.value, place))
+    with pytest.raises(Refusal) as caught:
+        check_numbers(still, asked.unknowns, asked.model)
+    assert caught.value.findings[0].code == "MEA002"
+    assert f"({1e3 * place:g}, " in caught.value.findings[0].message
+
+
 def test_exchanged_columns_of_a_real_robot():
     readings, asked = campaign("kuka_kr270", "deflections", np.random.default_rng(5))
     message = refused(replace(readings, q=readings.q[:, [0, 1, 2, 4, 3, 5]]), asked, "IDN014")

@@ -16,7 +16,8 @@ from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patte
 from postproc.diagnosis.sample import sample_of
 from postproc.diagnosis.search import model_unknowns, search
 from postproc.diagnosis.search_result import Search
-from postproc.diagnosis.unmoved_geometry import restore_unmoved_geometry
+from postproc.diagnosis.unmoved_parameters import restore_unmoved_parameters
+from postproc.diagnosis.unstated_geometry import take_in_unstated_geometry
 from postproc.diagnosis.verdict import (
     ONLY_TOGETHER,
     OTHER_COURSE,
@@ -125,14 +126,16 @@ def diagnose(
                 rejected += [(one.candidate, ONLY_TOGETHER) for one in verdict.named]
                 verdict = replace(verdict, word="unknown", named=(), alternatives=())
                 final, disagreement, agreed = base, (), False
-    every, final = final, restore_unmoved_geometry(final)
+    before, every = {u.key for u in final.unknowns}, take_in_unstated_geometry(final)
+    additional = {u.key for u in every.unknowns} - before
+    final = restore_unmoved_parameters(every)
     # where an effect is missing in a model its own parameters compensate for that
-    moved = refitted(final) if verdict.word not in ("ambiguous", "unknown") else ()
+    moved = refitted(final, additional) if verdict.word not in ("ambiguous", "unknown") else ()
     final = cover_equivalent_models(final, every, result.base, names)
     if moved:
         # that something has moved is clear; which of equivalent parameters it is may not be
         by_key = {e.unknown.key: e for e in final.estimates}
-        moved = refitted(final) or tuple(by_key[e.unknown.key] for e in moved)
+        moved = refitted(final, additional) or tuple(by_key[e.unknown.key] for e in moved)
     verdict = with_estimates(verdict, final, result)
     verdict = replace(verdict, rejected=tuple(rejected), refitted=moved)
     where = residual_patterns(stated, result.confirmed)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -390,14 +390,17 @@ def with_estimates(verdict: Verdict, final: Fit, search: Search) -> Verdict:
     return replace(verdict, named=tuple(named))
 
 
-def refitted(final: Fit) -> tuple[Estimate, ...]:
-    """The model's own parameters that the readings clearly put elsewhere than the robot file does."""
+def refitted(final: Fit, additional: Set[tuple[int, str]] = frozenset()) -> tuple[Estimate, ...]:
+    """The model's own parameters that the readings clearly put elsewhere than the robot file does; those of
+    ``additional`` keys count as stated at their null."""
     moved = []
     for estimate in final.estimates:
-        stated = estimate.unknown.stated
-        if stated is None or estimate.unknown.parameter.hardware:
+        unknown, stated = estimate.unknown, estimate.unknown.stated
+        if (stated is None and unknown.key not in additional) or unknown.parameter.hardware:
             continue
-        uncertainty = np.hypot(estimate.ci95, stated.interval or 0.0)
-        if abs(estimate.value - stated.value) > CLEAR * uncertainty:
+        before, interval = (
+            (unknown.parameter.null, 0.0) if stated is None else (stated.value, stated.interval)
+        )
+        if abs(estimate.value - before) > CLEAR * np.hypot(estimate.ci95, interval or 0.0):
             moved.append(estimate)
     return tuple(moved)

@@ -43,8 +43,9 @@ class CandidateSetups:
 
     limits (n, 2) [rad, m] of the axes; box (3, 2) [m], robot base: where TCP, flange and reflectors may be; tracker
     (3,) [m], robot base, None: every reflector is seen; cone [rad]: half angle about the direction in which a
-    reflector faces; spacing [rad]: two poses differ by that in one axis at least.  pulls (P, 3) [N]: forces at the TCP,
-    robot base axes, that can be pulled with, each an alternative to the loads.
+    reflector faces; spacing [rad]: two poses differ by that in one axis at least; spread: and by that share of the
+    ranges of the axes in the mean.  pulls (P, 3) [N]: forces at the TCP, robot base axes, that can be pulled with, each
+    an alternative to the loads.
     """
 
     tool: Poses
@@ -61,6 +62,7 @@ class CandidateSetups:
     cone: float
     spacing: float
     pulls: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    spread: float = 0.0
 
     @property
     def facing(self) -> Floats:
@@ -143,6 +145,15 @@ def steps(robot: Robot) -> Floats:
 def spacings(robot: Robot, spacing: float) -> Floats:
     """(n,) [rad, m] of each axis, of a ``spacing`` [rad]."""
     return np.array([spacing * (1.0 if joint.kind == "revolute" else SLIDING_DEG) for joint in robot.joints])
+
+
+def spreads(offer: CandidateSetups) -> Floats | None:
+    """(n,) [rad, m] of each axis, whose shares sum up to 1 where two poses differ by ``offer.spread``; None without."""
+    ranges = offer.limits[:, 1] - offer.limits[:, 0]
+    moves = ranges > 0
+    if not offer.spread or not moves.any():
+        return None
+    return np.where(moves, offer.spread * moves.sum() * ranges, np.inf)
 
 
 def drawn(model: StiffnessModel, offer: CandidateSetups, count: int, rng: np.random.Generator) -> Setups:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.base.arrays import Floats
-from postproc.experiments.candidate_setups import CandidateSetups, Setups, drawn, spacings
+from postproc.experiments.candidate_setups import CandidateSetups, Setups, drawn, spacings, spreads
 from postproc.experiments.criteria import Disagreement
 from postproc.experiments.exchange import CandidateSet, exchanged, grown
 from postproc.experiments.observability import Observability, expected, observability
@@ -49,10 +49,15 @@ class Chosen:
 
 
 def rivalry(
-    first: CompetingModel, second: CompetingModel, common: Floats, q: Floats, spacing: Floats
+    first: CompetingModel,
+    second: CompetingModel,
+    common: Floats,
+    q: Floats,
+    spacing: Floats,
+    spread: Floats | None = None,
 ) -> tuple[CandidateSet, Disagreement]:
-    """The choices, and what is to be maximized: ``common`` (C, r, U) is fitted by both; q (C, n), spacing (n,) as in
-    ``CandidateSet``."""
+    """The choices, and what is to be maximized: ``common`` (C, r, U) is fitted by both; q (C, n), spacing (n,) and
+    spread (n,) as in ``CandidateSet``."""
     fitted = np.concatenate([common, first.columns, second.columns], axis=2)
     length = np.linalg.norm(fitted, axis=(0, 1))
     fitted = fitted / np.where(length > 0, length, 1.0)
@@ -67,7 +72,7 @@ def rivalry(
     )
     base = np.diag(np.repeat([0.0, LOOSE**2], [shown, fitted.shape[2]]))
     rows = np.concatenate([first.pattern, second.pattern, fitted], axis=2)
-    return CandidateSet(rows, q, spacing, base), Disagreement(pairs)
+    return CandidateSet(rows, q, spacing, base, spread), Disagreement(pairs)
 
 
 def discriminating(
@@ -78,13 +83,14 @@ def discriminating(
     spacing: Floats,
     count: int,
     start_choice: Sequence[int] = (),
+    spread: Floats | None = None,
 ) -> Chosen:
     """The ``count`` setups that keep the two furthest apart, the smaller of both separations; ``common`` (C, r, U),
-    ``q`` (C, n), ``spacing`` (n,) as of ``rivalry``.
+    ``q`` (C, n), ``spacing`` (n,), ``spread`` (n,) as of ``rivalry``.
 
     ``start_choice``: a choice to start with.
     """
-    choices, criterion = rivalry(first, second, common, q, spacing)
+    choices, criterion = rivalry(first, second, common, q, spacing, spread)
     chosen, _ = exchanged(choices, criterion, grown(choices, criterion, start_choice, count))
     one, two = np.sqrt(criterion.separations(choices.information(chosen))).tolist()
     return Chosen(tuple(chosen), (one, two))
@@ -123,7 +129,7 @@ def apart(
     stage("looking for poses")
     setups = drawn(model, offer, candidates, rng)
     one, two, both = ([u for u in unknowns if u.prior is None] for unknowns in (first, second, common))
-    spacing = spacings(model.robot, offer.spacing)
+    spacing, spread = spacings(model.robot, offer.spacing), spreads(offer)
     widths = [_patterns(model, one), _patterns(model, two), len(one), len(two)]
     separation: dict[int, tuple[float, float]] = {}
 
@@ -143,7 +149,7 @@ def apart(
         last: Sequence[int] = ()
         for size in sorted(sizes):
             done = discriminating(
-                *alternatives, parts[4], pool.setups.q, spacing, size, start_choice.get(size, last)
+                *alternatives, parts[4], pool.setups.q, spacing, size, start_choice.get(size, last), spread
             )
             by_size[size] = last = done.setups
             separation[size] = done.separation

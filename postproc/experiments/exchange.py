@@ -31,12 +31,14 @@ ENOUGH = 1e-3
 @dataclass(frozen=True)
 class CandidateSet:
     """C setups: rows (C, r, p) whitened; axes q (C, n), by ``spacing`` (n,) of which two chosen ones differ in one at
-    least; base (p, p): information that is there before, positive definite."""
+    least; base (p, p): information that is there before, positive definite.  ``spread`` (n,): differences of two chosen
+    ones, each over that of its axis, sum up to 1 at least; None: nothing more than the spacing is asked for."""
 
     rows: Floats
     q: Floats
     spacing: Floats
     base: Floats
+    spread: Floats | None = None
 
     def information(self, chosen: Sequence[int]) -> Floats:
         """(p, p) of a choice, with the base."""
@@ -45,7 +47,11 @@ class CandidateSet:
 
     def near(self, setup: int) -> Bools:
         """(C,) setups that are too like this one to be chosen beside it."""
-        return np.asarray((np.abs(self.q - self.q[setup]) < self.spacing).all(axis=1))
+        away = np.abs(self.q - self.q[setup])
+        alike = (away < self.spacing).all(axis=1)
+        if self.spread is not None:
+            alike |= (away / self.spread).sum(axis=1) < 1.0
+        return np.asarray(alike)
 
     def blocked(self, chosen: Sequence[int]) -> Bools:
         """(C,) setups that cannot be chosen beside ``chosen``."""
@@ -126,6 +132,6 @@ def random_choice(choices: CandidateSet, count: int, rng: np.random.Generator) -
     for setup in rng.permutation(len(choices.q)).tolist():
         if len(chosen) == count:
             break
-        if not any((np.abs(choices.q[setup] - choices.q[other]) < choices.spacing).all() for other in chosen):
+        if not choices.near(setup)[chosen].any():
             chosen.append(setup)
     return chosen

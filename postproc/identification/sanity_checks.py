@@ -78,8 +78,9 @@ LOADED = ("elastic", "gear", "sensor")
 
 
 def check_numbers(readings: Readings, unknowns: Sequence[Unknown], model: StiffnessModel) -> None:
-    """Raises Refusal for readings whose numbers alone cannot be right: IDN010 radians, IDN011 all poses alike, IDN012
-    metres or micrometres, IDN013 no load, or always the same one where that states nothing."""
+    """Raises Refusal for readings whose numbers alone cannot be right: IDN010 radians, IDN011 all poses alike, MEA002
+    one place for all poses, IDN012 metres or micrometres, IDN013 no load, or always the same one where that states
+    nothing."""
     file = str(readings.files[0]) if readings.files else ""
     turning = np.array([not slides for _, slides in readings.joints])
     spread = np.ptp(readings.q, axis=0)
@@ -104,6 +105,17 @@ def check_numbers(readings: Readings, unknowns: Sequence[Unknown], model: Stiffn
                 f"all poses are alike: no joint moves by more than {spread[turning].max(initial=0.0) / DEG:.2g} deg",
                 file,
                 help="one pose cannot separate the parameters; `compensate plan` proposes poses that do",
+            )
+        )
+    value = readings.value[~readings.based]
+    if not readings.deflection and len(value) > 2 and (value == value[0]).all():
+        raise Refusal(
+            Finding(
+                "MEA002",
+                f"X, Y, Z are the same in all rows ({', '.join(f'{x / MM:g}' for x in value[0])} mm), although the"
+                " joints move",
+                file,
+                help="fill in the measured values",
             )
         )
     _check_loads(readings, unknowns, model, file)

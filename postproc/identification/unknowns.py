@@ -7,14 +7,22 @@ from dataclasses import dataclass, replace
 
 from postproc.base.findings import Finding, Refusal, nearest
 from postproc.effects import EFFECTS, Effect, Parameter
+from postproc.effects.base_offset import BaseOffset
 from postproc.effects.joint_offset import JointOffset
 from postproc.effects.link_geometry import LinkGeometry
+from postproc.effects.tool_offset import ToolOffset
 from postproc.model import StiffnessModel
 from postproc.robot.description import Value
 
-PLAUSIBLE = {JointOffset.name: 5e-3, LinkGeometry.name: 5e-4}
-"""[m, rad] Standard deviation of what geometry is off by: a drive is mastered by hand, an axis is bored by a machine.
-Of values that predict the same readings, the smallest in these units are the most plausible."""
+PLAUSIBLE = {
+    JointOffset.name: {"m": 5e-3, "rad": 5e-3},
+    LinkGeometry.name: {"m": 5e-4, "rad": 5e-4},
+    ToolOffset.name: {"m": 1e-3, "rad": 5e-3},
+    BaseOffset.name: {"m": 5e-3, "rad": 5e-3},
+}
+"""Effect and unit -> standard deviation of what geometry is off by: a drive is mastered by hand, an axis is bored by a
+machine, a tool is touched off at a tip and a base at a few points.  Of values that predict the same readings, the
+smallest in these units are the most plausible."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +44,12 @@ class Unknown:
     @property
     def key(self) -> tuple[int, str]:
         return self.term, self.parameter.name
+
+    @property
+    def plausible(self) -> float | None:
+        """[SI] Standard deviation of what it is off by where it is of geometry; None of other effects."""
+        effect = self.name.partition(".")[0].partition(" ")[0]
+        return PLAUSIBLE.get(effect, {}).get(self.parameter.unit)
 
 
 @dataclass(frozen=True)
@@ -106,7 +120,7 @@ def with_gauge(unknowns: Sequence[Unknown]) -> tuple[Unknown, ...]:
     stated."""
     return tuple(
         replace(u, value=u.parameter.null if u.stated is None else u.stated.value, prior=wide, gauge=True)
-        if u.prior is None and (wide := PLAUSIBLE.get(u.name.partition(".")[0].partition(" ")[0])) is not None
+        if u.prior is None and (wide := u.plausible) is not None
         else u
         for u in unknowns
     )

@@ -65,6 +65,10 @@ WIDER = 0.05
 CANDIDATES = 300
 """Poses to choose from."""
 
+SPREAD = 0.15
+"""Share of the ranges of the axes, in the mean, by which two proposed poses differ at least: what is repeated at one
+pose repeats its errors too.  Of two random poses it is a third."""
+
 
 @dataclass(frozen=True)
 class DiagnoseRequest:
@@ -178,6 +182,7 @@ def _validated(path: Path, measured: Measured, diagnosis: Diagnosis) -> Validate
         readings = replace(readings, direction=np.zeros_like(readings.q))
     campaign = Campaign(readings, measured.campaign.stated_tool)
     check_numbers(readings, (), measured.model)
+    check_fit(campaign, diagnosis.final.model, ())
     done = validated(diagnosis.stated, diagnosis.final, campaign)
     known = np.isfinite(readings.value)
     before, after = (Sizes.of(lengths_of(one, known)) for one in (done.before, done.after))
@@ -232,11 +237,12 @@ def _next_poses(request: DiagnoseRequest, measured: Measured, diagnosis: Diagnos
     if measured.readings.deflection and not len(offer.loads) + len(offer.pulls):
         return None  # what can be hung or pulled with is not known
     pairs = [(first, other) for first, *others in diagnosis.verdict.alternatives for other in others[:TRIED]]
-    for offered in (narrow, offer):
+    # poses that differ less are better than none
+    for offered in (narrow, offer, replace(offer, spread=0.0)):
         tried = [_discriminating_poses(measured, diagnosis, offered, one, other) for one, other in pairs]
         plans = [plan for plan in tried if plan]
         best = max(plans, key=lambda plan: min(plan.separation), default=None)
-        if best is not None and (min(best.separation) >= SETTLES or offered is offer):
+        if best is not None and (min(best.separation) >= SETTLES or offered is not narrow):
             return replace(best, beyond=_beyond(measured, best, narrow.limits))
     return None
 
@@ -330,6 +336,7 @@ def _offer(request: DiagnoseRequest, measured: Measured, base: Fit) -> Candidate
         tracker=None,
         cone=np.pi,
         spacing=5 * DEG,
+        spread=SPREAD,
     )
 
 

@@ -262,7 +262,10 @@ def _validated(request: IdentifyRequest, measured: Measured, before: Fit, after:
         raise Refusal(
             Finding("MEA008", "the file is of another kind than the fitted data", str(request.validate[0]))
         )
-    return validated(before, after, Campaign(readings, measured.campaign.stated_tool))
+    campaign = Campaign(readings, measured.campaign.stated_tool)
+    check_numbers(readings, (), after.model)
+    check_fit(campaign, after.model, ())
+    return validated(before, after, campaign)
 
 
 def _result(

@@ -28,6 +28,30 @@ def share(records: Records, holds: Callable[[dict], bool]) -> str:
     return f"{k:4d} of {n:4d}  {100 * k / n:5.1f} %  ({100 * low:.1f} .. {100 * high:.1f})"
 
 
+def share_of_runs(runs: Sequence[Sequence[bool | None]]) -> str:
+    """Count, share and its 95 % interval of what holds in several runs, None does not count.
+
+    What one run has goes together: as many independent ones count as have the variance that the runs show (Kish,
+    Survey Sampling (1965), Sec. 8.2), and no more than there are; Wilson's interval of so many.
+    """
+    each = np.array([[sum(x is True for x in one), sum(x is not None for x in one)] for one in runs]).reshape(
+        -1, 2
+    )
+    each = each[each[:, 1] > 0]
+    k, n = each.sum(axis=0)
+    if not n:
+        return "-"
+    count, away = float(n), each[:, 0] - k / n * each[:, 1]
+    if len(each) > 1 and away.any():
+        variance = len(each) / (len(each) - 1) * float(away @ away) / n**2
+        count = min(count, k / n * (1 - k / n) / variance)
+    z, p = 1.959964, k / n
+    middle = (p + z**2 / (2 * count)) / (1 + z**2 / count)
+    half = z / (1 + z**2 / count) * np.sqrt(p * (1 - p) / count + z**2 / (4 * count**2))
+    low, high = max(0.0, middle - half), min(1.0, middle + half)
+    return f"{k:4d} of {n:4d}  {100 * p:5.1f} %  ({100 * low:.1f} .. {100 * high:.1f})"
+
+
 def is_right(record: dict) -> bool:
     return record["right"]
 
@@ -100,8 +124,8 @@ def matrix(records: Records) -> list[str]:
     ]
     told = [f"{name:46} {share(chosen, holds)}" for name, chosen, holds in lines]
     for k, words in enumerate(("95 % intervals hold what no scatter gives", "  the true values themselves")):
-        holds = [{"it": both[k]} for r in records if r["covered"] for both in r["covered"].values()]
-        told.append(f"{words:46} {share([h for h in holds if h['it'] is not None], lambda h: h['it'])}")
+        holds = [[both[k] for both in r["covered"].values()] for r in records if r["covered"]]
+        told.append(f"{words:46} {share_of_runs(holds)}")
     again = [r for r in records if "again" in r]
     words = "named, then nothing missing with the new file"
     told.append(f"{words:46} {share(again, lambda r: r['again'] == 'nothing_missing')}")
@@ -133,14 +157,14 @@ def matrix(records: Records) -> list[str]:
 
 def of_intervals(records: Records) -> list[str]:
     """How often intervals hold the true values, by row and by kind of parameter."""
-    held: dict[str, list[dict]] = {}
+    held: dict[str, dict[str, list[bool]]] = {}
     for record in records:
         for name, (_, inside, *_) in (record["covered"] or {}).items():
             if inside is not None:
                 for kind in (record["row"], name.partition(".")[0].partition(" ")[0]):
-                    held.setdefault(kind, []).append({"it": inside})
+                    held.setdefault(kind, {}).setdefault(record["key"], []).append(inside)
     return [
-        f"true values in intervals, {kind:20} {share(of, lambda h: h['it'])}" for kind, of in held.items()
+        f"true values in intervals, {kind:20} {share_of_runs([*of.values()])}" for kind, of in held.items()
     ]
 
 

@@ -1,5 +1,5 @@
-"""Lengths, twists and zeros that the readings do not ask for stay as the robot file states them: each one that is
-fitted along adds its scatter to every prediction."""
+"""Lengths, twists, zeros, compliances and weights that the readings do not ask for stay as the robot file states them:
+each one that is fitted along adds its scatter to every prediction."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from postproc.base.arrays import Floats
 from postproc.diagnosis.selection import basis_of, outside
 from postproc.identification.fit import Fit, fit
 from postproc.identification.least_squares import scales
-from postproc.identification.unknowns import PLAUSIBLE, Unknown
+from postproc.identification.unknowns import Unknown
 
 LEAST = 4.0
 """Variances of a reading that a parameter must at least explain; of many that are tried, 2 ln(how many): the risk
@@ -22,8 +22,9 @@ TOGETHER = 0.05
 """Probability that what is left out would explain as much by chance."""
 
 
-def restore_unmoved_geometry(fitted: Fit) -> Fit:
-    """The fit with those geometric parameters alone that the readings ask for, the others as stated or at their null.
+def restore_unmoved_parameters(fitted: Fit) -> Fit:
+    """The fit with those parameters alone, of geometry and of what the robot file states, that the readings ask for,
+    the others as stated or at their null.
 
     Parameters are taken in one after the other, that first which explains most beside what is in already; then those
     that the others make unnecessary leave again.  Intervals stay those of the fit of all: they hold what the others may
@@ -32,7 +33,7 @@ def restore_unmoved_geometry(fitted: Fit) -> Fit:
     """
     from scipy.special import chdtri
 
-    places = [k for k, u in enumerate(fitted.unknowns) if _effect(u) in PLAUSIBLE and not u.fixed]
+    places = [k for k, u in enumerate(fitted.unknowns) if _may_stay(u)]
     if len(places) < 2:
         return fitted
     own = [fitted.unknowns[k] for k in places]
@@ -63,8 +64,10 @@ def _covariance(found: Fit, fitted: Fit) -> Floats:
     return covariance
 
 
-def _effect(unknown: Unknown) -> str:
-    return unknown.name.partition(".")[0].partition(" ")[0]
+def _may_stay(unknown: Unknown) -> bool:
+    """Whether a parameter is of geometry, or one that the robot file states and that is no dimension of hardware."""
+    own = unknown.stated is not None and not unknown.parameter.hardware
+    return not unknown.fixed and (own or unknown.plausible is not None)
 
 
 def _before(unknown: Unknown) -> float:
