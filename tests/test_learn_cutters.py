@@ -1,9 +1,14 @@
 """The tools of a program that is learnt from come from where the main job takes them."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 from blind_parts.shop import write_shop
 
 from postproc.base.findings import Refusal
+from postproc.base.geometry import Poses
+from postproc.learning.ball_displacement import BallDisplacement
 from postproc.workflows.learn_points import read_job
 from postproc.workflows.preparation import Request
 
@@ -49,3 +54,30 @@ def test_without_any_tool_nothing_is_learnt(tmp_path):
     with pytest.raises(Refusal) as caught:
         cutters(shop(tmp_path))
     assert caught.value.findings[0].code == "LRN011"
+
+
+def test_a_ball_with_its_tip_in_place_moves_the_surface_by_its_lean():
+    """A path along x over surfaces that lean more and more: where the ball is 0.02 mm larger, the larger one about the
+    centre that lies higher by as much touches planes of these normals by so much deeper."""
+    count, radius, more = 31, 8e-3, 2e-5
+    lean = np.linspace(0.0, np.pi / 2, count)
+    normal = np.column_stack([0 * lean, np.sin(lean), np.cos(lean)])
+    tip = np.column_stack([np.linspace(0, 0.6, count), 0 * lean, 0 * lean])
+    spindle = np.tile([0.0, 0.0, -1.0], (count, 1))
+
+    def depth(size: float) -> np.ndarray:
+        """How far a ball of this radius reaches against the normals."""
+        return size - np.sum((tip - size * spindle) * normal, axis=1)
+
+    contact = tip - radius * spindle - radius * normal
+    points = SimpleNamespace(
+        row=np.arange(count), normal=normal, spindle=spindle, point=contact, to_contact=contact - tip
+    )
+    zero = np.zeros(2 * count, int)
+    ball = BallDisplacement({1: more}, zero + 1, np.repeat([0, 1], count), points)
+    poses = Poses(np.tile(np.eye(3), (count, 1, 1)), tip)
+    moved = ball.at(np.arange(count), poses)
+    deeper = depth(radius + more) - depth(radius)
+    assert np.ptp(deeper) > 0.9 * more
+    np.testing.assert_allclose(np.sum(moved * normal, axis=1), -deeper, atol=0.1 * more)
+    assert not ball.at(np.arange(count, 2 * count), poses).any(), "nothing was measured of this operation"

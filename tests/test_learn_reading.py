@@ -87,7 +87,11 @@ def test_a_comment_that_is_not_understood_is_refused_with_its_line(tmp_path, hea
     ("columns", "rows", "word"),
     [
         ("X,Y,Z,NX,NY,DEV,NZZ", None, "nzz"),
-        ("X,Y,Z,NX,NY,NZ,MEASURED", None, "measured"),
+        ("X,Y,Z,NX,NY,NZ,MEASURED", None, "'DEV' is missing, and 'measured' is unknown"),
+        (COLUMNS + ",ID", [f"{row},7" for row in ROWS], "'id' is unknown"),
+        (COLUMNS, ["mm,mm,mm,,,,mm", *ROWS], "not a number"),
+        (COLUMNS, [*ROWS, "8 points"], "1 cells"),
+        (COLUMNS + ",MX", [f"{row},7" for row in ROWS], "'MY' is missing"),
         (COLUMNS, [*ROWS[:7], "1,2,3,0,0,2,0.1"], "normal has the length 2"),
         (COLUMNS, [*ROWS[:7], "1,2,3,0,0,1,9"], "9 mm is more than"),
         (COLUMNS, [*ROWS[:7], "90000,2,3,0,0,1,0.1"], "away"),
@@ -102,7 +106,9 @@ def test_a_comment_that_is_not_understood_is_refused_with_its_line(tmp_path, hea
     ],
 )
 def test_rows_that_cannot_be_are_refused(tmp_path, columns, rows, word):
-    assert word.lower() in refused(write(tmp_path, None, columns, rows)).message.lower()
+    finding = refused(write(tmp_path, None, columns, rows))
+    assert word.lower() in finding.message.lower()
+    assert finding.help
 
 
 def test_points_without_a_deviation_are_reported_and_excluded(tmp_path):
@@ -110,3 +116,41 @@ def test_points_without_a_deviation_are_reported_and_excluded(tmp_path):
     assert len(part) == 8
     (finding,) = part.findings
     assert (finding.code, finding.line) == ("LRN005", len(HEAD) + 1 + 9)
+
+
+def placed(sign: float = 1.0, off: float = 0.0, shift: float = 0.0) -> list[str]:
+    """Rows with the measured places of their deviations times ``sign``, ``off`` mm farther out; the part is shifted by
+    ``shift`` mm."""
+    rows = []
+    for i in range(30):
+        point = np.array([10.0 * i, 5.0 * i * i, -3.0 * (i % 3)])
+        normal = [np.array([0, 0.6, 0.8]), np.array([0, -0.6, 0.8]), np.array([0.8, 0, 0.6])][i % 3]
+        size = 0.05 * np.sin(2.0 * i) + 0.01
+        place = point + (sign * size + off) * normal + [shift, 0, -shift]
+        rows.append(",".join(f"{one:.4f}" for one in (*point, *normal, size, *place)))
+    return rows
+
+
+PLACED = COLUMNS + ",MX,MY,MZ"
+
+
+def test_measured_places_show_the_sign(tmp_path):
+    assert read_measured_part(write(tmp_path, None, PLACED, placed())).sign_seen
+    assert read_measured_part(write(tmp_path, None, PLACED, placed(shift=0.3))).sign_seen
+    missing = {"positive": "material_missing"}
+    assert read_measured_part(write(tmp_path, missing, PLACED, placed(-1.0))).sign_seen
+    assert not read_measured_part(write(tmp_path)).sign_seen
+
+
+@pytest.mark.parametrize(
+    ("head", "rows", "word"),
+    [
+        ({}, placed(-1.0), "the other side"),
+        ({"positive": "material_missing"}, placed(), "the other side"),
+        ({}, placed(0.0), "by DEV"),
+        ({"alignment": "datum"}, placed(shift=0.3), "by DEV"),
+        ({"alignment": "datum"}, placed(off=1.0), "by DEV"),
+    ],
+)
+def test_measured_places_that_contradict_the_deviations_are_refused(tmp_path, head, rows, word):
+    assert word in refused(write(tmp_path, head, PLACED, rows)).message

@@ -75,6 +75,13 @@ class Attribution:
         """Whether the part does not distinguish it from other effects: it is applied at this place only."""
         return bool(self.stand_in) and self.stand_in in (cause.place, cause.name)
 
+    @property
+    def evidence(self) -> float:
+        """Logarithm of the probability of the deviations, outliers at their cost, and each effect that joined at that
+        of having been looked for among others."""
+        looked = len(self.candidates) * float(np.log(max(len(self.rivals), 1)))
+        return self.explained.evidence + OUTLIERS_EACH * int((~self.kept).sum()) - looked
+
     @cached_property
     def deviations(self) -> Floats:
         """(P,) standard deviations of the causes after the measurement."""

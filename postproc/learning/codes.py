@@ -150,5 +150,13 @@ CODES = define(
             action="Check it: set it in the control, or add the lines of the learnt file to the cell, never both.",
             example="A cutter that was ground is 0.03 mm smaller.",
         ),
+        "LRN019": Code(
+            "warning",
+            "sign of the deviations is not shown",
+            meaning="A compensated program leaves errors that are about as likely with the other sign.",
+            consequence="If `# positive:` is wrong, the next part has twice the error; the part after it shows that.",
+            action="Add the measured places (MX, MY, MZ), or probe a place where material was surely left.",
+            example="A first part of a robot and forces that are nearly as stated.",
+        ),
     }
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,8 @@ from postproc.base.arrays import Floats, Ints, frozen
 from postproc.base.findings import Finding, Refusal, nearest
 from postproc.base.tables import CsvTable, is_missing, read_table
 from postproc.base.units import MM
+from postproc.learning.measured_places import PLACES as MEASURED
+from postproc.learning.measured_places import sign_shown
 
 KEYS = (
     "positive",
@@ -28,7 +30,7 @@ SIGNS = ("material_left", "material_missing")
 ALIGNMENTS = ("free", "datum", "partial")
 FREEDOMS = ("x", "y", "z", "a", "b", "c")
 PLACE, NORMAL = ("x", "y", "z"), ("nx", "ny", "nz")
-COLUMNS = (*PLACE, *NORMAL, "dev", "sigma", "line", "operation", "feature", "part", "t", "temp")
+COLUMNS = (*PLACE, *NORMAL, "dev", "sigma", "line", "operation", "feature", "part", "t", "temp", *MEASURED)
 
 FAR, LARGEST, LEAST_SIGMA, MOST_SIGMA = 20_000.0, 5.0, 1e-4, 1.0
 """[mm] of a place, a deviation, and the scatter of a probe."""
@@ -36,8 +38,16 @@ FAR, LARGEST, LEAST_SIGMA, MOST_SIGMA = 20_000.0, 5.0, 1e-4, 1.0
 LEAST, MOST = 6, 5000
 """Points of one file."""
 
+ROWS = (
+    "below the comments come one header (X,Y,Z,NX,NY,NZ,DEV, ...) and a row a point with as many cells, without rows of"
+    " units or totals; DEV is empty, - or nan where a point has none"
+)
+"""What to do where nothing more special is known."""
+
+SHOWN = 3
+
 _UNIT = re.compile(r"^(?P<name>[a-z]+)\s*[\[(](?P<unit>[^\])]*)[\])]$")
-_UNITS = {"dev": "mm", "sigma": "mm", "t": "s", "temp": "degc", **dict.fromkeys(PLACE, "mm")}
+_UNITS = {"dev": "mm", "sigma": "mm", "t": "s", "temp": "degc", **dict.fromkeys((*PLACE, *MEASURED), "mm")}
 _KEYED = re.compile(r"([^:=]*+)[:=]\s*+(.*)")
 _HEX = re.compile(r"[0-9a-f]{12,64}\Z")
 
@@ -51,7 +61,8 @@ class MeasuredPart:
     names of each point, "" without; program_line (K,): 0 without; part (K,): number of the part in this file; time
     (K,) [s], NaN without; line (K,): of the file.  freedoms: of x, y, z, a, b, c those in which the part was aligned to
     its own points; cut_with: file of the program that cut it, "" for the original; program_digest: what the file states
-    of it; base: number of the base, None without.
+    of it; base: number of the base, None without; sign_seen: measured places show on which side of the nominal ones
+    they lie, as the deviations say.
     """
 
     file: Path
@@ -72,6 +83,7 @@ class MeasuredPart:
     spring_pass: bool
     base: int | None
     findings: tuple[Finding, ...]
+    sign_seen: bool = False
 
     def __len__(self) -> int:
         return len(self.deviation)
@@ -95,6 +107,13 @@ def read_measured_part(path: Path) -> MeasuredPart:
 
     Raises Refusal: FIL001..FIL003 (no text), LRN001 (comments, header or rows are wrong).
     """
+    try:
+        return _read(path)
+    except Refusal as refusal:
+        raise Refusal(*(one if one.help else replace(one, help=ROWS) for one in refusal.findings)) from None
+
+
+def _read(path: Path) -> MeasuredPart:
     table = _named(read_table(path, "LRN001"))
     stated, findings = _stated(table)
     sign = _choice(table, stated, "positive", SIGNS, "what a positive DEV means")
@@ -112,7 +131,9 @@ def read_measured_part(path: Path) -> MeasuredPart:
             table, table.header_line, f"{len(rows)} points are more than {MOST}", "remove neighbours"
         )
     if len(rows) < len(table):
-        message = f"{len(table) - len(rows)} points have no deviation and are excluded"
+        left = len(table) - len(rows)
+        verbs = ("points have", "are") if left > 1 else ("point has", "is")
+        message = f"{left} {verbs[0]} no deviation and {verbs[1]} excluded"
         findings.append(Finding("LRN005", message, str(path), int(table.lines[np.isnan(deviation)][0])))
     _check_sizes(table, point, normal, deviation, rows)
     sigma = _sigma(table, stated, rows)
@@ -123,6 +144,9 @@ def read_measured_part(path: Path) -> MeasuredPart:
     spring = _flag(table, stated, "spring_pass", ("true", "false"), "write true or false") == "true"
     length = np.linalg.norm(normal[rows], axis=1, keepdims=True)
     time = table.numbers_or_nan("t") if "t" in table else np.full(len(table), np.nan)
+    seen = sign_shown(
+        table, (point, normal), deviation * (1 if sign == "material_left" else -1), rows, freedoms
+    )
     return MeasuredPart(
         file=path,
         digest=table.digest,
@@ -142,6 +166,7 @@ def read_measured_part(path: Path) -> MeasuredPart:
         spring_pass=spring,
         base=_base(table, stated),
         findings=tuple(findings),
+        sign_seen=seen,
     )
 
 
@@ -160,14 +185,21 @@ def _named(table: CsvTable, needed: Sequence[str] = (*PLACE, *NORMAL, "dev")) ->
             raise table.header_error(f"the unit of column {head!r} is wrong: {expected} is expected")
         if name in columns:
             raise table.header_error(f"column {name!r} occurs twice")
-        if name not in COLUMNS:
-            help = "columns: " + ", ".join(name.upper() for name in COLUMNS)
-            raise table.header_error(f"column {head[:40]!r} is unknown{nearest(name, COLUMNS)}", help)
         columns[name] = column
+    unknown = [name for name in columns if name not in COLUMNS]
     for name in needed:
         if name not in columns:
             help = "X,Y,Z (nominal point, mm), NX,NY,NZ (outward normal) and DEV (mm) are needed"
-            raise table.header_error(f"column {name.upper()!r} is missing", help)
+            also = (
+                ", and "
+                + " and ".join(f"{one[:40]!r}" for one in unknown[:SHOWN])
+                + (" is" if len(unknown) == 1 else " are")
+                + " unknown"
+            )
+            raise table.header_error(f"column {name.upper()!r} is missing" + also * bool(unknown), help)
+    for name in unknown:
+        help = "remove it, or rename it to one of " + ", ".join(name.upper() for name in COLUMNS)
+        raise table.header_error(f"column {name[:40]!r} is unknown{nearest(name, COLUMNS)}", help)
     return CsvTable(
         table.path,
         table.code,

@@ -8,6 +8,7 @@ at this place only, the smooth displacement that no cause explains.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +20,7 @@ from postproc.compensation.desired_path import DesiredPath
 from postproc.compensation.known_error import KnownError
 from postproc.compensation.tool_displacement import ToolDisplacement
 from postproc.learning.attribution import Attribution
+from postproc.learning.ball_displacement import BallDisplacement
 from postproc.learning.causes import CauseKind
 from postproc.process.force_factors import ForceFactors
 from postproc.process.operation_names import OperationNames
@@ -27,6 +29,9 @@ from postproc.toolpath import Toolpath
 
 ROUNDED = 2 * MM
 """Half of the path over which a vertex counts as turned: a force does not step, and a step needs many points."""
+
+_FLAT = 0.1
+"""Cosine of the angle to the spindle below which a surface is a wall, and above 1 less which it is a floor."""
 
 _SIDE = 0.9
 """Share of the points of an operation that have to lie on one side of the feed."""
@@ -88,11 +93,13 @@ def corner_size(result: Attribution) -> float:
 class LearnedError(KnownError):
     """What was learnt of a part beside robot and forces.
 
-    tool: longer and thicker tools; base (6,): shift [m] and turn [rad] about ``centre`` (3,) in the axes (3, 3) of the
-    base; drift (3,) [m] over the whole program, with ``time`` (N,) 0..1; corners: where the force is larger there."""
+    tool: longer and thicker tools; ball: those with a ball of another radius; base (6,): shift [m] and turn [rad] about
+    ``centre`` (3,) in the axes (3, 3) of the base; drift (3,) [m] over the whole program, with ``time`` (N,) 0..1;
+    corners: where the force is larger there."""
 
     result: Attribution
     tool: ToolDisplacement
+    ball: BallDisplacement
     base: Floats = field(default_factory=lambda: np.zeros(6))
     centre: Floats = field(default_factory=lambda: np.zeros(3))
     axes: Floats = field(default_factory=lambda: np.eye(3))
@@ -104,6 +111,7 @@ class LearnedError(KnownError):
         """(K, 3) [m] of motions ``rows`` (K,) at ``wanted`` (K) poses, at ``share`` (K,) of their paths."""
         along = np.ones(len(rows)) if share is None else share
         moved = self.result.field_at(wanted.position) + self.tool.at(rows, wanted, along)
+        moved += self.ball.at(rows, wanted)
         if self.base.any():
             place = (wanted.position - self.centre) @ self.axes
             moved += (self.base[:3] + np.cross(self.base[3:], place)) @ self.axes.T
@@ -117,35 +125,44 @@ class LearnedError(KnownError):
 
 def learned_error(
     result: Attribution,
-    tool: ToolDisplacement,
+    tool: tuple[ToolDisplacement, BallDisplacement],
     rigid: tuple[Floats, Floats],
     time: Floats,
     corners: CornerError | None,
 ) -> LearnedError:
-    """The known error of an attribution; tool: as it was learnt; rigid: centre (3,) [m] and axes (3, 3) of the base;
-    time (N,) 0..1; corners: where a force in corners was learnt."""
+    """The known error of an attribution.
+
+    tool: as it was learnt, with a flat end and with a ball; rigid: centre (3,) [m] and axes (3, 3) of the base; time
+    (N,) 0..1; corners: where a force in corners was learnt.
+    """
     base, drift = np.zeros(6), np.zeros(3)
     for cause, value in zip(result.causes, result.x.tolist(), strict=True):
         if cause.kind is CauseKind.SHIFT and cause.group == "base":
             base["xyzuvw".index(cause.parameter)] = value
         elif cause.kind is CauseKind.SHIFT and cause.place == "drift":
             drift["xyz".index(cause.parameter)] = value
-    return LearnedError(result, tool, base, *rigid, drift, time, corners)
+    return LearnedError(result, *tool, base, *rigid, drift, time, corners)
 
 
-def wall_sides(result: Attribution, path: DesiredPath, operations: OperationNames) -> dict[str, int]:
+def wall_sides(
+    result: Attribution, path: DesiredPath, operations: OperationNames, tool: Ints, ball: Sequence[int]
+) -> dict[str, int]:
     """Operation -> side of the feed, 1: right, -1: left, seen along the spindle towards the tip, on which its measured
-    walls lie, where that is one."""
+    walls lie, where that is one; tool (N,): numbers; of tools with a ``ball`` only where no surface is inclined, as
+    their radius acts less there."""
     points = result.prediction.points
     tangent = path.tangent(points.row, points.share)
     across = np.cross(points.spindle, tangent)
     # the material is where the outward normal comes from
     towards = -np.sum(across * points.normal, axis=1)
     wall = np.abs(towards) > 0.5
+    along = np.abs(np.sum(points.spindle * points.normal, axis=1))
+    inclined = np.isin(tool[points.row], ball) & (along > _FLAT) & (along < 1 - _FLAT)
     sides = {}
     for index, name in enumerate(operations.names):
-        own = wall & (operations.which[points.row] == index)
-        if own.any():
+        of_it = operations.which[points.row] == index
+        own = wall & of_it
+        if own.any() and not (inclined & of_it).any():
             sign = np.sign(towards[own])
             mean = float(sign.mean())
             if abs(mean) >= 2 * _SIDE - 1:

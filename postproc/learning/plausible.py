@@ -128,9 +128,11 @@ def wrong_sign(gain: float, file: str) -> Finding:
         f"the deviations are exp({gain:.0f}) times likelier with the other sign: probably they count what is missing"
         " as positive, or the reverse"
     )
-    return Finding(
-        "LRN004", message, file, help="check the line `# positive:` against a place that was cut too deep"
+    help = (
+        "check the line `# positive:` against a place that was cut too deep; columns MX, MY, MZ with measured places"
+        " show the sign"
     )
+    return Finding("LRN004", message, file, help=help)
 
 
 def _check_size(look: FirstLook, file: str) -> list[Finding]:

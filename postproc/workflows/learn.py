@@ -17,11 +17,12 @@ from postproc.base.read_files import read_file
 from postproc.base.system import relative_path
 from postproc.base.units import MM
 from postproc.learning.attribution import Attribution, attribute
+from postproc.learning.ball_displacement import BallDisplacement
 from postproc.learning.causes import CausePrediction, PriorKnowledge
 from postproc.learning.history import RecordedStep
 from postproc.learning.measured_part import MeasuredPart, read_measured_part
 from postproc.learning.next_program import force_factors, learned_error, wall_sides
-from postproc.learning.other_readings import check_readings
+from postproc.learning.other_readings import StatedPart, check_readings
 from postproc.learning.plausible import FirstLook, check_deviations, check_explained
 from postproc.learning.promise import Promise, measured_rms, promise
 from postproc.learning.push_test import with_push_test
@@ -99,11 +100,14 @@ def _learn(request: LearnRequest, stage: Stage) -> Learned:
         prediction = with_push_test(prediction, read_measurements(request.push, joints))
     file = str(parts[0].file)
     look = FirstLook.of(prediction, matched.deviation, matched.layout)
-    files = [(matched.file == number, not part.cut_with, str(part.file)) for number, part in enumerate(parts)]
-    for own, original, name in files:
-        rows = np.flatnonzero(own)
+    stated = [
+        StatedPart(matched.file == number, not part.cut_with, str(part.file), part.sign_seen)
+        for number, part in enumerate(parts)
+    ]
+    for part in stated:
+        rows = np.flatnonzero(part.points)
         wrong = check_deviations(
-            look.part(rows), [matched.feature[i] for i in rows], original, name, len(files) > 1
+            look.part(rows), [matched.feature[i] for i in rows], part.original, part.file, len(parts) > 1
         )
         if wrong:
             raise Refusal(*wrong)
@@ -113,13 +117,20 @@ def _learn(request: LearnRequest, stage: Stage) -> Learned:
     except np.linalg.LinAlgError as error:
         message = f"the deviations determine no causes: {error}"
         raise Refusal(Finding("LRN004", message, file, help="check DEV and the base of the points")) from None
-    wrong = check_explained(result, file) or check_readings(prediction, result, files)
+    wrong = check_explained(result, file)
+    readings = [] if wrong else check_readings(prediction, result, matched.around, stated)
+    wrong += [one for one in readings if one.severity == "error"]
     if wrong:
         raise Refusal(*wrong)
     promised = promise(result, matched.file == len(parts) - 1, request.gain)
     history = _history(parts, programs, remembered, matched, result)
     findings = [*(f for part in parts for f in part.findings), *job.findings, *matched.findings]
-    findings += [*remembered.findings, *_findings(parts, matched, result, promised), *_unkept(parts, history)]
+    findings += [
+        *readings,
+        *remembered.findings,
+        *_findings(parts, matched, result, promised),
+        *_unkept(parts, history),
+    ]
     lines = f"{main.program.stem}.tool_errors.yaml"
     findings += tool_and_base_findings(result, file, lines)
     learned = Learned(
@@ -250,9 +261,12 @@ def _learned_inputs(job: CutProgram, matched: Matched, result: Attribution) -> L
     rigid = matched.centre, matched.axes
     corners = corner_error(job, result, forces(task.force))
     path = task.desired_path
-    errors = tool_errors(result, job.ready.cell, wall_sides(result, path, job.operations))
-    tool = tool_displacement(errors, task, job.spindle, job.tool, job.operations)
-    error = learned_error(result, tool, rigid, job.time, corners)
+    errors = tool_errors(result, job.ready.cell, wall_sides(result, path, job.operations, job.tool, job.ball))
+    flat = {k: replace(one, radius=0.0) if k in job.ball else one for k, one in errors.items()}
+    tool = tool_displacement(flat, task, job.spindle, job.tool, job.operations)
+    radius = {k: one.radius for k, one in errors.items() if k in job.ball and one.radius}
+    ball = BallDisplacement(radius, job.tool, job.operations.which, result.prediction.points)
+    error = learned_error(result, (tool, ball), rigid, job.time, corners)
     return LearnedInputs(forces, error)
 
 
@@ -279,7 +293,7 @@ def _published(
         files[robot_path] = content
     if factors:
         files[folder / f"{main.program.stem}.force_factors.yaml"] = factors
-    sides = wall_sides(result, job.ready.task.desired_path, job.operations)
+    sides = wall_sides(result, job.ready.task.desired_path, job.operations, job.tool, job.ball)
     if tools := tool_error_lines(result, parts, job.ready.cell, sides):
         files[folder / f"{main.program.stem}.tool_errors.yaml"] = tools
     own = folder / f"{main.program.stem}.learned.json"

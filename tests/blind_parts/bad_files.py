@@ -39,7 +39,9 @@ def _numbers(
         rows = [line.split(",") for line in lines[HEAD:]]
         cells = np.array([row[:7] for row in rows], float)
         change(cells, rng)
-        body = [",".join([*(f"{x:.6f}" for x in own), row[7]]) for own, row in zip(cells, rows, strict=True)]
+        body = [
+            ",".join([*(f"{x:.6f}" for x in own), *row[7:]]) for own, row in zip(cells, rows, strict=True)
+        ]
         return [*lines[:HEAD], *body]
 
     return spoil
@@ -98,14 +100,16 @@ def _origin(cells: Cells, rng: np.random.Generator) -> None:
     cells[:, rng.integers(2)] += rng.choice([-1.0, -0.3, 0.3, 1.0])
 
 
-GOOD = ("none", "none (by the original)")
+PLACES = " (with measured places)"
+GOOD = ("none", "none (by the original)", "none" + PLACES)
 UNSEEN = ("sign (compensated)",)
-"""Seen only where the errors are large: not counted."""
+"""Seen only where the errors are large, and warned of otherwise: not counted."""
 
 MISTAKES: dict[str, Callable[[Lines, np.random.Generator], Lines]] = {
     **dict.fromkeys(GOOD, lambda lines, rng: lines),
     "sign": _numbers(_sign),
     "sign (compensated)": _numbers(_sign),
+    "sign" + PLACES: _numbers(_sign),
     "origin": _numbers(_origin),
     "columns X and Y": _columns(0, 1),
     "columns NX and NY": _columns(3, 4),
@@ -122,7 +126,7 @@ MISTAKES: dict[str, Callable[[Lines, np.random.Generator], Lines]] = {
     "actual for nominal": _numbers(_actual),
 }
 """A wrong sign is that of a part of the uncompensated program: on a well compensated one either sign is as likely, and
-those are counted by themselves."""
+those are counted by themselves, without and with measured places."""
 
 
 def main() -> None:
@@ -143,6 +147,7 @@ def main() -> None:
     parser.add_argument("--details", action="store_true")
     chosen = parser.parse_args()
     codes: dict[str, list[str]] = {name: [] for name in chosen.only.split(",")}
+    unseen = dict.fromkeys(codes, 0)
     with tempfile.TemporaryDirectory() as name:
         original = write_shop(Path(name) / "shop")
         shop, compensated = original.parent, original.parent / "compensated" / "part.src"
@@ -165,24 +170,28 @@ def main() -> None:
                 cut_by = original if mistake in ("sign", GOOD[1]) else compensated
                 stated = original if mistake == "the original named" else cut_by
                 path = shop / "m.csv"
-                write_csv(path, surface, every, read[cut_by], stated, NOISE)
+                write_csv(path, surface, every, read[cut_by], stated, NOISE, mistake.endswith(PLACES))
                 path.write_text("\n".join([*MISTAKES[mistake](path.read_text().splitlines(), rng), ""]))
                 try:
                     done = learn(LearnRequest(Request(original, force=""), (path,), dry_run=True))
                     answer = "learnt" if done.promise.better else "nothing written"
+                    unseen[mistake] += answer == "learnt" and any(f.code == "LRN019" for f in done.findings)
                 except Refusal as refusal:
                     answer = refusal.findings[0].code
                     if chosen.details:
                         print(mistake, refusal.findings[0].message[:150])
                 codes[mistake].append(answer)
     print(
-        "| mistake | files | learnt from % | nothing written | refused by |\n| --- | --- | --- | --- | --- |"
+        "| mistake | files | learnt from % | of these warned of the sign | nothing written | refused by |\n"
+        + "| --- " * 6
+        + "|"
     )
     for mistake, answers in codes.items():
         refused = sorted({one for one in answers if one.startswith("LRN")})
         learnt = share_interval(answers.count("learnt"), len(answers))
         print(
-            f"| {mistake} | {len(answers)} | {learnt} | {answers.count('nothing written')} | {', '.join(refused)} |"
+            f"| {mistake} | {len(answers)} | {learnt} | {unseen[mistake]} | {answers.count('nothing written')}"
+            f" | {', '.join(refused)} |"
         )
     wrong = [one for mistake, answers in codes.items() if mistake not in GOOD + UNSEEN for one in answers]
     print(f"\n{wrong.count('learnt')} of {len(wrong)} files with a mistake are learnt from")

@@ -214,9 +214,10 @@ def aligned_rms(surface: Surface, errors: np.ndarray) -> float:
 
 
 def write_csv(
-    path: Path, surface: Surface, chosen: np.ndarray, deviation: np.ndarray, program: Path, noise: float
-) -> None:
-    """The file of a measured part."""
+    path: Path, surface: Surface, chosen: np.ndarray, deviation: np.ndarray, program: Path, noise: float,
+    places: bool = False,
+) -> None:  # fmt: skip
+    """The file of a measured part; ``places``: with the measured ones."""
     original = program.name == "part.src" and program.parent == surface.folder
     name = "original" if original else str(program.relative_to(surface.folder))
     lines = [
@@ -225,9 +226,11 @@ def write_csv(
         f"# cut_with: {name}",
         f"# sha256: {hashlib.sha256(program.read_bytes()).hexdigest()}",
         f"# sigma_mm: {1e3 * noise:g}",
-        "X,Y,Z,NX,NY,NZ,DEV,FEATURE",
+        "X,Y,Z,NX,NY,NZ,DEV,FEATURE" + ",MX,MY,MZ" * places,
     ]
     for k, value in zip(chosen.tolist(), deviation.tolist(), strict=True):
         numbers = [*surface.point[k], *surface.normal[k], 1e3 * value]
-        lines.append(",".join([*(f"{one:.5f}" for one in numbers), surface.feature[k]]))
+        place = (surface.point[k] + 1e3 * value * surface.normal[k]).tolist() if places else []
+        words = [*(f"{one:.5f}" for one in numbers), surface.feature[k], *(f"{one:.4f}" for one in place)]
+        lines.append(",".join(words))
     path.write_text("\n".join(lines) + "\n")
