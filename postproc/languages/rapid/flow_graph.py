@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Hashable
 from dataclasses import dataclass, field
 
+from postproc.languages.core.motion_sources import Meeting
 from postproc.languages.rapid.syntax_tree import (
     GOES_ON,
     SENSE,
@@ -49,12 +52,14 @@ class FlowBlock:
 
 class FlowGraph:
     """The blocks of a routine; the first one is where it starts.  ``missing``: a label that no statement has;
-    ``loops``: block with the condition of a loop -> the block after it; between them are those of its body."""
+    ``loops``: block with the condition of a loop -> the block after it; between them are those of its body;
+    ``meetings``: of places where paths meet."""
 
     def __init__(self, body: tuple[Statement, ...]) -> None:
         self.blocks: list[FlowBlock] = [FlowBlock()]
         self.missing = False
         self.loops: dict[int, int] = {}
+        self.meetings: defaultdict[Hashable, Meeting] = defaultdict(Meeting)
         self._depth = 0  # loops in each other
         self._labels: dict[bytes, int] = {}
         self._jumps: list[tuple[FlowBlock, bytes]] = []

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from postproc.base.arrays import Bools, Floats, Ints, shared, sums
 from postproc.base.document import Document
+from postproc.languages.core.motion_sources import Meeting, Source, distinguished, expanded
 from postproc.languages.rapid.data_types import ABSENT
 from postproc.languages.rapid.declared_data import walk
 from postproc.languages.rapid.instructions import MOTIONS, OTHER_MOTIONS
 from postproc.languages.rapid.module_frames import ModuleFrames
 from postproc.languages.rapid.motion_facts import MotionFact, Problem, item_of, not_read, reason_of
-from postproc.languages.rapid.program_state import ELSEWHERE, START, VARYING, ProgramState
+from postproc.languages.rapid.program_state import ELSEWHERE, VARYING, ProgramState
 from postproc.languages.rapid.propagation import OTHER, Propagation
 from postproc.languages.rapid.quaternions import WORST
 from postproc.languages.rapid.syntax_tree import Instruction, PlainMotions, RapidRoutine
@@ -89,12 +90,30 @@ class ModuleRows:
             self.problems.setdefault(row, problem)
 
     def before(self, row: int) -> tuple[int, ...]:
-        """Rows after which a row runs; -1 for the start of the program, -2 for what it does not contain."""
+        """Rows after which a row runs; -1 for the start of the program, -2 for what it does not contain, and alone
+        where they are too many to be told from each other."""
         at = self.fact_of[row]
         if self.first[at] < row < self.never_from:
             return (row - 1,)
         places = self.facts[at].before
-        return tuple(sorted({one if one in (START, ELSEWHERE) else self.ends[one] for one in places}))
+        if not distinguished(places):
+            return (ELSEWHERE,)
+        return tuple(sorted({self._row(one) for one in expanded(places, set())}))
+
+    def starts_of(self, row: int, seen: set[Meeting]) -> list[int]:
+        """The rows among the sources of a row, with those behind meetings that are not in ``seen``."""
+        at = self.fact_of[row]
+        if self.first[at] < row < self.never_from:
+            return [row - 1]
+        return self.rows_of(self.facts[at].before, seen)
+
+    def rows_of(self, sources: Iterable[Source], seen: set[Meeting]) -> list[int]:
+        """The rows among offsets of motions, with those behind meetings that are not in ``seen``."""
+        return sorted({row for one in expanded(sources, seen) if (row := self._row(one)) >= 0})
+
+    def _row(self, source: int) -> int:
+        """The row of the motion at an offset; one that is in no row ends elsewhere."""
+        return self.ends.get(source, ELSEWHERE) if source >= 0 else source
 
 
 def module_rows(

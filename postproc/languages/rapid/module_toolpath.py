@@ -11,6 +11,7 @@ from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses, arc_through
 from postproc.base.units import DEG, MM
+from postproc.languages.core.motion_sources import Meeting, Source
 from postproc.languages.core.row_facts import OTHER_PATHS, follow_on, grouped, moving_external, only_used
 from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.module_frames import ModuleFrames
@@ -100,21 +101,21 @@ def module_toolpath(
     return toolpath, places, findings
 
 
-def _zones(rows: ModuleRows, continues: Bools, waited: set[int]) -> tuple[Floats, Bools]:
+def _zones(rows: ModuleRows, continues: Bools, waited: set[Source]) -> tuple[Floats, Bools]:
     """(N,) [m] by which each motion may leave its path before the target, NaN where not known; (N,) where the robot
     stops: where the program waits before the next motion too, whatever zone is stated.  waited: offsets of motions
     after which it waits, and goes on where the file does not say."""
     zone = rows.per_row([fact.zone * MM for fact in rows.facts], float)
     stops = rows.per_row([fact.stops for fact in rows.facts], np.bool_)
+    seen: set[Meeting] = set()
     for first, _, fact in rows.each():
         if fact.waits == Waits.NO or first >= rows.never_from:
             continue
-        before = [row for row in rows.before(first) if row >= 0 and zone[row] != 0.0]
+        before = [row for row in rows.starts_of(first, seen) if zone[row] != 0.0]
         surely = fact.waits == Waits.YES and bool(continues[first])
         zone[before] = 0.0 if surely else np.nan
         stops[before] |= surely
-    for at in waited & rows.ends.keys():
-        row = rows.ends[at]
+    for row in rows.rows_of(waited, set()):
         zone[row] = 0.0 if stops[row] else np.nan
     return zone, stops
 
@@ -132,7 +133,11 @@ def _continues(rows: ModuleRows) -> Bools:
     """(N,) each motion surely starts where the row before it ends, and no other motion starts there."""
     first = [row for row in rows.first[:-1].tolist() if row < rows.never_from]
     before = [rows.before(row) for row in first]
-    return follow_on(np.arange(len(rows)) < rows.never_from, first, before)
+    found = follow_on(np.arange(len(rows)) < rows.never_from, first, before)
+    many = {one for fact in rows.facts for one in fact.before if isinstance(one, Meeting)}
+    crowd = np.array(rows.rows_of(many, set()), np.int64)
+    found[crowd[crowd < len(rows) - 1] + 1] = False
+    return found
 
 
 def _arcs(rows: ModuleRows, frames: ModuleFrames, position: Floats, kind: Ints) -> Arcs:
@@ -229,19 +234,18 @@ def _locked(
 ) -> dict[int, Finding]:
     """Rows from whose end a refused arc starts, or where the program reads the position."""
     locked: dict[int, Finding] = {}
+    seen: set[Meeting] = set()
     for row in refused:
         if rows.fact(row).form.kind != Kind.CIRC:
             continue
-        for one in rows.before(row):
-            if one >= 0:
-                message = f"the arc in line {rows.lines[row]} starts at this end point and is not corrected"
-                locked.setdefault(one, _finding(document, rows, one, "RAP012", message))
+        for one in rows.starts_of(row, seen):
+            message = f"the arc in line {rows.lines[row]} starts at this end point and is not corrected"
+            locked.setdefault(one, _finding(document, rows, one, "RAP012", message))
+    seen = set()
     for at, places in sorted(flow.reads.items()):
-        for place in sorted(places):
-            if place >= 0:
-                one = rows.ends[place]
-                message = f"line {document.place(at)[0]} reads the end position of this motion"
-                locked.setdefault(one, _finding(document, rows, one, "RAP002", message))
+        for one in rows.rows_of(places, seen):
+            message = f"line {document.place(at)[0]} reads the end position of this motion"
+            locked.setdefault(one, _finding(document, rows, one, "RAP002", message))
     return dict(sorted(locked.items()))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from postproc.languages.core.motion_sources import Meeting, Source, met
 from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.evaluation import Evaluator
 from postproc.languages.rapid.instructions import (
@@ -63,7 +64,7 @@ class MotionFact:
     stops: bool
     orientation: OrientationMode
     arc: ArcFrame
-    before: frozenset[int]
+    before: frozenset[Source]
     force: Remark | Varying | None
     switch: Remark | Varying | None
     problem: Problem | None
@@ -76,8 +77,8 @@ class MotionFact:
         """How many motions it represents."""
         return 1 if self.lines is None else len(self.lines)
 
-    def joined(self, other: MotionFact) -> MotionFact:
-        """What holds in both executions."""
+    def joined(self, other: MotionFact, meeting: Meeting) -> MotionFact:
+        """What holds in both executions; meeting: that of what runs before them."""
         via = self.via
         if via is not None:
             via = UnknownData(DIFFERS) if other.via is None else joined(via, other.via, DIFFERS)
@@ -94,7 +95,7 @@ class MotionFact:
             if self.orientation == other.orientation
             else OrientationMode.UNKNOWN,
             arc=self.arc if self.arc == other.arc else ArcFrame.UNKNOWN,
-            before=self.before | other.before,
+            before=met(self.before, other.before, meeting),
             force=self.force if self.force == other.force else VARYING,
             switch=self.switch if self.switch == other.switch else VARYING,
             problem=self.problem or other.problem,

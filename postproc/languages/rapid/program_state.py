@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from enum import IntEnum
 
+from postproc.languages.core.motion_sources import Meeting, Source, met
+from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.syntax_tree import Remark
 from postproc.languages.rapid.values import UnknownData, Value, joined
@@ -23,6 +25,10 @@ class Varying(IntEnum):
 VARYING = Varying.VARYING
 
 
+class _Other(Exception):
+    """Two values differ."""
+
+
 @dataclass(slots=True)
 class ProgramState:
     """``values``: of variables that are assigned anywhere; ``last``: offsets of the motions after which the robot is
@@ -31,8 +37,8 @@ class ProgramState:
     the FORCE and COMPENSATE comments in force.
     """
 
-    values: dict[bytes, Value] = field(default_factory=dict)
-    last: frozenset[int] = frozenset([START])
+    values: PersistentMap = field(default_factory=lambda: PersistentMap(KeyNumbers()))
+    last: frozenset[Source] = frozenset([START])
     displaced: frozenset[bytes] = frozenset()
     override: float | None = 1.0
     orientation: OrientationMode = OrientationMode.VAR
@@ -44,43 +50,69 @@ class ProgramState:
     waits: Waits = Waits.NO
 
     def copy(self) -> ProgramState:
-        new = ProgramState()
-        new.take(self)
-        new.values = dict(self.values)
-        return new
+        return ProgramState(
+            self.values, self.last, self.displaced, self.override, self.orientation, self.arc, self.force,
+            self.switch, self.checks_linear, self.checks_joint, self.waits,
+        )  # fmt: skip
 
     def take(self, other: ProgramState) -> None:
-        """Becomes the other one, and shares its values."""
+        """Becomes the other one."""
         for one in fields(self):
             setattr(self, one.name, getattr(other, one.name))
 
-    def join(self, other: ProgramState) -> bool:
-        """Takes in what holds where another path meets this one; whether anything changed."""
-        changed = False
-        for name in self.values.keys() | other.values.keys():
-            one, two = self.values.get(name), other.values.get(name)
-            shown = name.rpartition(b"/")[2].decode("latin-1")
-            reason = f"{shown} has different values on several paths of the program"
-            new = UnknownData(reason) if one is None or two is None else joined(one, two, reason)
-            if new != one:
-                self.values[name] = new
-                changed = True
-        merged = {
-            "last": self.last | other.last,
-            "displaced": self.displaced | other.displaced,
-            "override": self.override if self.override == other.override else None,
-            "orientation": self.orientation
-            if self.orientation == other.orientation
-            else OrientationMode.UNKNOWN,
-            "arc": self.arc if self.arc == other.arc else ArcFrame.UNKNOWN,
-            "force": self.force if self.force == other.force else VARYING,
-            "checks_linear": self.checks_linear if self.checks_linear == other.checks_linear else None,
-            "checks_joint": self.checks_joint if self.checks_joint == other.checks_joint else None,
-            "waits": self.waits if self.waits == other.waits else Waits.MAYBE,
-            "switch": self.switch if self.switch == other.switch else VARYING,
-        }
-        for name_, value in merged.items():
-            if getattr(self, name_) != value:
-                setattr(self, name_, value)
-                changed = True
-        return changed
+    def put(self, name: bytes, value: Value) -> None:
+        self.values = self.values.set(name, value)
+
+    def is_same(self, other: ProgramState) -> bool:
+        """Whether the same holds in both."""
+        return _set_apart(self) == _set_apart(other) and same_values(self.values, other.values)
+
+    def join(self, other: ProgramState, meeting: Meeting) -> bool:
+        """Takes in what holds where another path meets this one, at the place of ``meeting``; whether anything
+        changed."""
+        before = self.values, _set_apart(self)
+        self.values = self.values.merged(other.values, _of_paths)
+        self.last = met(self.last, other.last, meeting)
+        self.displaced |= other.displaced
+        self.override = self.override if self.override == other.override else None
+        if self.orientation != other.orientation:
+            self.orientation = OrientationMode.UNKNOWN
+        self.arc = self.arc if self.arc == other.arc else ArcFrame.UNKNOWN
+        self.force = self.force if self.force == other.force else VARYING
+        self.switch = self.switch if self.switch == other.switch else VARYING
+        if self.checks_linear != other.checks_linear:
+            self.checks_linear = None
+        self.checks_joint = self.checks_joint if self.checks_joint == other.checks_joint else None
+        self.waits = self.waits if self.waits == other.waits else Waits.MAYBE
+        return self.values is not before[0] or _set_apart(self) != before[1]
+
+
+def _set_apart(state: ProgramState) -> tuple[object, ...]:
+    """What holds but for values."""
+    return (
+        state.last, state.displaced, state.override, state.orientation, state.arc, state.force, state.switch,
+        state.checks_linear, state.checks_joint, state.waits,
+    )  # fmt: skip
+
+
+def _of_paths(name: bytes, one: Value | None, other: Value | None) -> Value:
+    """The value of a variable where two paths meet."""
+    shown = name.rpartition(b"/")[2].decode("latin-1")
+    reason = f"{shown} has different values on several paths of the program"
+    new = UnknownData(reason) if one is None or other is None else joined(one, other, reason)
+    return one if one is not None and new == one else new
+
+
+def same_values(one: PersistentMap, other: PersistentMap) -> bool:
+    """Whether the same variables have the same values."""
+    try:
+        one.merged(other, _checked)
+    except _Other:
+        return False
+    return True
+
+
+def _checked(_: bytes, one: Value | None, other: Value | None) -> Value | None:
+    if one != other:
+        raise _Other
+    return one

@@ -6,13 +6,17 @@ them.  A motion has one fact, which holds in all of its executions.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Set
 from dataclasses import replace
 
+from postproc.languages.core.motion_sources import Meeting, Source
+from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.core.row_facts import SPEAKS
 from postproc.languages.core.waits import Waits
+from postproc.languages.rapid.call_effects import CallEffects
 from postproc.languages.rapid.declared_data import DeclaredData, Usage, first_value, names_in, walk
-from postproc.languages.rapid.evaluation import Evaluator, Typed, is_component, unknown_record
+from postproc.languages.rapid.evaluation import Evaluator, is_component, unknown_record
 from postproc.languages.rapid.flow_graph import FlowGraph, Step
 from postproc.languages.rapid.instructions import (
     DISPLACING,
@@ -27,15 +31,14 @@ from postproc.languages.rapid.instructions import (
     is_motion,
 )
 from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read, override_of, waits_at
-from postproc.languages.rapid.program_state import ELSEWHERE, START, ProgramState
+from postproc.languages.rapid.program_state import ELSEWHERE, START, ProgramState, same_values
+from postproc.languages.rapid.routine_names import RoutineNames
 from postproc.languages.rapid.routine_runner import RoutineRunner
 from postproc.languages.rapid.syntax_tree import (
     Argument,
     AssignmentStatement,
     DataDeclaration,
     Expression,
-    For,
-    FunctionCall,
     Instruction,
     Module,
     NotUnderstood,
@@ -94,13 +97,15 @@ class Propagation:
         self.facts: dict[int, MotionFact] = {}
         self.passed: dict[int, tuple[Remark, int]] = {}
         self.calls: dict[bytes, int] = {}
-        self.reads: dict[int, frozenset[int]] = {}
+        self.reads: defaultdict[int, set[Source]] = defaultdict(set)
         self.unread: dict[int, NotUnderstood] = {}
         self._graphs: dict[bytes, FlowGraph] = {}
-        self._locals: dict[bytes, dict[bytes, tuple[bytes, bytes]]] = {}
-        self._active: list[RapidRoutine] = []
+        self._effects = CallEffects(self.usage)
+        self._names = RoutineNames(self.data, self.usage)
+        self._numbers = KeyNumbers()
+        self._meetings: defaultdict[int, Meeting] = defaultdict(Meeting)
         self.rows = 0
-        self.waited: set[int] = set()
+        self.waited: set[Source] = set()
         self._steps = MOST_STEPS + 4 * sum(_length(one) for r in module.routines for one in walk(r.body))
         self._runner = RoutineRunner(self._after)
 
@@ -131,25 +136,25 @@ class Propagation:
         return graph
 
     def _enter(self, routine: RapidRoutine, is_main: bool) -> None:
-        state = ProgramState(last=frozenset([START if is_main else ELSEWHERE]))
+        state = ProgramState(PersistentMap(self._numbers), frozenset([START if is_main else ELSEWHERE]))
         for name in self.usage.assigned:
             if name in self.data and not self.data.is_constant(name):
                 shown = name.decode("latin-1")
                 value = self.data.look(name)[0] if is_main else UnknownData(f"{shown} is assigned elsewhere")
-                state.values[name] = value
-        if is_main and state.values:  # main starts again with what its last run left
+                state.put(name, value)
+        if is_main and any(state.values.items()):  # main starts again with what its last run left
             for _ in range(8):
                 self._runner.start()
                 after = self._routine(routine, state.copy(), False)
                 again = state.copy()
                 if after is not None:
-                    again.join(after)
-                again.last = state.last
-                if again.values == state.values:
+                    again.join(after, Meeting())
+                if same_values(again.values, state.values):
                     break
                 state.values = again.values
             else:
-                state.values = {name: UnknownData("it differs between runs") for name in state.values}
+                for name, _ in list(state.values.items()):
+                    state.put(name, UnknownData("it differs between runs"))
         self._runner.start()
         end = self._routine(routine, state, True)
         if end is not None:
@@ -157,16 +162,17 @@ class Propagation:
 
     def _leave_place(self, state: ProgramState) -> None:
         """What the file does not contain goes on, or nothing does."""
-        self.waited |= state.last if state.waits else set()
+        if state.waits:
+            self.waited |= state.last
         state.last = frozenset([ELSEWHERE])
 
     def _routine(self, routine: RapidRoutine, state: ProgramState, recording: bool) -> ProgramState | None:
         """The state after a routine; None where it does not come back."""
-        self._active.append(routine)
+        self._names.active.append(routine)
         try:
             return self._runner.run(self._graph(routine), state, recording)
         finally:
-            self._active.pop()
+            self._names.active.pop()
 
     def _after(self, graph: FlowGraph, at: int, state: ProgramState) -> list[tuple[int, ProgramState]]:
         """Where a block leads, and what holds there."""
@@ -197,10 +203,10 @@ class Propagation:
                 if step.value is not None:
                     self._functions(step.value, state)
                 value = first_value(step, self._evaluator(state))
-                key = self._key(step.name)
+                key = self._names.key(step.name)
                 if step.kind == b"PERS" and step.name in self.usage.assigned:
                     value = UnknownData(f"{step.name.decode('latin-1')} is kept between calls")
-                state.values[key] = value
+                state.put(key, value)
             case Remark():
                 self._remark(step, state)
             case NotUnderstood():
@@ -211,7 +217,7 @@ class Propagation:
         self.unread.setdefault(step.start, step)
         if is_motion(step.first):
             moved = Instruction(step.first, (), step.start, step.stop)
-            self._move(moved, not_read(moved, OTHER, state, "it is not understood"), state)
+            self._not_read(moved, state, "it is not understood")
             return
         for name in step.names:
             self._forget(name, state, "a statement that is not understood may change it")
@@ -237,13 +243,15 @@ class Propagation:
         if routine is not None and routine.kind == b"PROC" and name not in MOTIONS:
             self._call(routine, step, state)
         elif name in MOTIONS:
-            self._move(step, motion_fact(step, MOTIONS[name], state, self._evaluator(state)), state)
+            if self._runner.recording:
+                self._record(step.start, motion_fact(step, MOTIONS[name], state, self._evaluator(state)))
+            self._moved(step.start, state)
             if name.endswith(b"SYNC"):
                 self.calls.setdefault(step.name, step.start)
         elif name in OTHER_MOTIONS:
-            self._move(step, not_read(step, OTHER, state, "this form of motion is not read"), state)
+            self._not_read(step, state, "this form of motion is not read")
             for argument_name in names_in(step.arguments):
-                if self._look(state)(argument_name)[1] not in _SETTINGS:
+                if self._names.look(argument_name, state)[1] not in _SETTINGS:
                     self._forget(argument_name, state, "an instruction may change it")
         else:
             self._setting(step, state)
@@ -279,22 +287,27 @@ class Propagation:
         elif name.startswith(b"WAIT"):
             self._change(tuple(a for a in step.arguments if a.name), state)
 
-    def _move(self, step: Instruction, fact: MotionFact, state: ProgramState) -> None:
-        self._record(step.start, fact)
-        state.last, state.waits = frozenset([step.start]), Waits.NO
+    def _not_read(self, step: Instruction, state: ProgramState, message: str) -> None:
+        """A motion of which only its place is known."""
+        if self._runner.recording:
+            self._record(step.start, not_read(step, OTHER, state, message))
+        self._moved(step.start, state)
 
     def _plain(self, step: PlainMotions, state: ProgramState) -> None:
         """Motions that are run one after the other."""
-        fact = motion_fact(step.first, MOTIONS[step.first.name], state, self._evaluator(state))
-        self._record(step.start, replace(fact, lines=step))
-        state.last, state.waits = frozenset([step.last]), Waits.NO
+        if self._runner.recording:
+            fact = motion_fact(step.first, MOTIONS[step.first.name], state, self._evaluator(state))
+            self._record(step.start, replace(fact, lines=step))
+        self._moved(step.last, state)
+
+    def _moved(self, at: int, state: ProgramState) -> None:
+        """What holds after the motion at an offset."""
+        state.last, state.waits = frozenset([at]), Waits.NO
 
     def _record(self, at: int, fact: MotionFact) -> None:
         """Takes up the fact of the motion at an offset."""
-        if not self._runner.recording:
-            return
         known = self.facts.get(at)
-        self.facts[at] = fact if known is None else known.joined(fact)
+        self.facts[at] = fact if known is None else known.joined(fact, self._meetings[at])
         self.rows += fact.count if known is None else 0
 
     def _unread_call(self, step: Instruction, state: ProgramState, moves: bool) -> None:
@@ -304,7 +317,7 @@ class Propagation:
         state.waits = max(state.waits, Waits.MAYBE)
         if step.name.startswith(b"%"):  # any procedure, those of this file among them
             self._forget_all(self.usage.assigned, state)
-            if any(_sets_modes(one) for one in self.module.routines if one not in self._active):
+            if any(_sets_modes(one) for one in self.module.routines if one not in self._names.active):
                 state.displaced |= {b"a procedure whose name is computed"}
         if moves:
             self._leave_place(state)
@@ -314,15 +327,15 @@ class Propagation:
             self._forget(name, state, "an instruction or a call may change it")
 
     def _forget(self, name: bytes, state: ProgramState, reason: str) -> None:
-        key = self._key(name)
+        key = self._names.key(name)
         if key != name or (name in self.data and not self.data.is_constant(name)):
-            state.values[key] = UnknownData(f"{name.decode('latin-1')}: {reason}")
+            state.put(key, UnknownData(f"{name.decode('latin-1')}: {reason}"))
 
     def _call(self, routine: RapidRoutine, step: Instruction, state: ProgramState) -> None:
         """Runs a routine of the file with its arguments."""
-        if routine in self._active or len(self._active) >= DEEPEST or self.is_unclear(routine):
+        if routine in self._names.active or len(self._names.active) >= DEEPEST or self.is_unclear(routine):
             self._unread_call(step, state, moves=True)
-            self._forget_all(self._assigned_by(routine.name), state)
+            self._forget_all(self._effects.of(routine.name).assigned, state)
             return
         evaluator = self._evaluator(state)
         required = [argument for argument in step.arguments if not argument.name]
@@ -334,12 +347,10 @@ class Propagation:
             if not parameter.optional and required:
                 argument = required.pop(0)
             key = routine.name + b"/" + parameter.name
-            given = argument is not None and argument.value is not None
-            inner.values[key] = (
-                plain(evaluator.value(argument.value))
-                if given and argument is not None and argument.value is not None
-                else UnknownData(f"{parameter.name.decode('latin-1')} is not given")
-            )
+            value: Value = UnknownData(f"{parameter.name.decode('latin-1')} is not given")
+            if argument is not None and argument.value is not None:
+                value = plain(evaluator.value(argument.value))
+            inner.put(key, value)
             if parameter.mode and argument is not None:
                 shared.append((parameter.name, argument))
         after = self._routine(routine, inner, self._runner.recording)
@@ -347,104 +358,48 @@ class Propagation:
             self._leave_place(state)
             return
         state.take(after)
-        changed = self._assigned_by(routine.name)
+        changed = self._effects.of(routine.name).assigned
         self._change(tuple(argument for name, argument in shared if name in changed), state)
-
-    def _reached(self, name: bytes) -> set[bytes]:
-        """The routine and those that it calls."""
-        seen: set[bytes] = set()
-        pending = [name]
-        while pending:
-            one = pending.pop()
-            if one not in seen:
-                seen.add(one)
-                pending += self.usage.calls.get(one, ())
-        return seen
-
-    def _assigned_by(self, name: bytes) -> set[bytes]:
-        """Names that a routine or those that it calls assign."""
-        return set().union(*(self.usage.assigned_in.get(one, set()) for one in self._reached(name)))
 
     def _note_reading(self, at: int, state: ProgramState) -> None:
         """The program reads where the robot is."""
         if self._runner.recording:
-            self.reads[at] = self.reads.get(at, frozenset()) | state.last
+            self.reads[at] |= state.last
 
-    def _forget_all(self, names: set[bytes], state: ProgramState) -> None:
+    def _forget_all(self, names: Set[bytes], state: ProgramState) -> None:
         for name in names:
             self._forget(name, state, "a function or a call may change it")
 
     def _functions(self, expression: Expression, state: ProgramState) -> None:
         """What the functions in an expression change: those of the program."""
-        pending: list[object] = [expression]
-        while pending:
-            one = pending.pop()
-            if isinstance(one, FunctionCall) and one.name not in PURE:
+        for one in self._effects.calls_in(expression):
+            if one.name not in PURE:
                 self._change(one.arguments, state)
-                reached = self._reached(one.name)
-                self._forget_all(self._assigned_by(one.name), state)
-                if reached & self.usage.moves:
+                reach = self._effects.of(one.name)
+                self._forget_all(reach.assigned, state)
+                if not reach.routines.isdisjoint(self.usage.moves):
                     self._leave_place(state)
-            if isinstance(one, FunctionCall) and one.name in READERS:
+            if one.name in READERS:
                 self._note_reading(one.start, state)
-            if isinstance(one, tuple):
-                pending += one
 
     def _assign(self, target: Expression, value: Value, state: ProgramState) -> None:
-        variable, place = self._evaluator(state).assigned_place(target)
+        evaluator = self._evaluator(state)
+        variable, place = evaluator.assigned_place(target)
         if variable is None:
             return
-        key, shown = self._key(variable), variable.decode("latin-1")
+        key, shown = self._names.key(variable), variable.decode("latin-1")
         if key == variable and (variable not in self.data or self.data.is_constant(variable)):
             return
-        old, kind = self._look(state)(variable)
+        old, kind = self._names.look(variable, state)
         if isinstance(old, UnknownData) and is_component(target):
-            old = unknown_record(kind, self._evaluator(state).components, old)
+            old = unknown_record(kind, evaluator.components, old)
         new = value
         if isinstance(value, UnknownData) and NOT_CONSTANT not in value.reason:
             new = UnknownData(f"{shown}{NOT_CONSTANT}{value.reason}")
-        state.values[key] = replaced(old, place, new, f"a part of {shown} is assigned that is not known")
-
-    def _key(self, name: bytes) -> bytes:
-        """The name of a variable in the state: that of a routine's own has its routine before it."""
-        if self._active:
-            if b" " in name:  # of a loop
-                return self._active[-1].name + b"/" + name
-            own = self._own(self._active[-1]).get(name)
-            return name if own is None else own[0]
-        return name
-
-    def _own(self, routine: RapidRoutine) -> dict[bytes, tuple[bytes, bytes]]:
-        """The routine's own names -> key in the state, type."""
-        names = self._locals.get(routine.name)
-        if names is None:
-            before = routine.name + b"/"
-            names = {one.name: (before + one.name, one.type) for one in routine.parameters}
-            for statement in walk(routine.body):
-                if isinstance(statement, DataDeclaration):
-                    names[statement.name] = (before + statement.name, statement.type)
-                elif isinstance(statement, For):
-                    names[statement.name] = (before + statement.name, b"NUM")
-            self._locals[routine.name] = names
-        return names
-
-    def _look(self, state: ProgramState) -> Callable[[bytes], Typed]:
-        def look(name: bytes) -> Typed:
-            if name in self.usage.later:
-                return UnknownData(f"{name.decode('latin-1')} is assigned in a trap or an error handler"), b""
-            key = self._key(name)
-            if key in state.values:
-                return state.values[key], self._type(name, key)
-            if key != name:
-                return UnknownData(f"{name.decode('latin-1')} has no value yet"), b""
-            return self.data.look(name)
-
-        return look
-
-    def _type(self, name: bytes, key: bytes) -> bytes:
-        if key == name:
-            return self.data.type_of(name)
-        return b"NUM" if b" " in name else self._own(self._active[-1])[name][1]
+        changed = replaced(old, place, new, f"a part of {shown} is assigned that is not known")
+        state.put(key, changed)
 
     def _evaluator(self, state: ProgramState) -> Evaluator:
-        return Evaluator(self._look(state), self.module.records, self.data.evaluator.shadowed)
+        return Evaluator(
+            lambda name: self._names.look(name, state), self.module.records, self.data.evaluator.shadowed
+        )

@@ -6,7 +6,9 @@ A loop whose conditions are constants is run pass by pass, any other one until n
 from __future__ import annotations
 
 from collections.abc import Callable
+from heapq import heappop, heappush
 
+from postproc.languages.core.motion_sources import Meeting
 from postproc.languages.rapid.flow_graph import FlowGraph
 from postproc.languages.rapid.program_state import ProgramState
 
@@ -46,7 +48,7 @@ class RoutineRunner:
                 self._repeated(graph, 0, len(graph.blocks), state, ends)
         finally:
             self.recording = before
-        return _joined(ends)
+        return _joined(ends, graph.meetings[-1])
 
     def _region(
         self, graph: FlowGraph, first: int, stop: int, state: ProgramState, ends: list[ProgramState]
@@ -75,12 +77,12 @@ class RoutineRunner:
                 if there == -1:
                     ends.append(after.copy())
                 elif first <= there < stop and there in starts:
-                    starts[there].join(after)
+                    starts[there].join(after, graph.meetings[there])
                 elif first <= there < stop:
                     starts[there] = after.copy()
                 elif there >= 0:
                     leaving.append(after.copy())
-        return _joined(leaving)
+        return _joined(leaving, graph.meetings[first, stop])
 
     def _loop(
         self, graph: FlowGraph, head: int, after: int, state: ProgramState, ends: list[ProgramState]
@@ -108,7 +110,7 @@ class RoutineRunner:
             if there == after:
                 return inside
             back = self._region(graph, head + 1, after, inside, ends)
-            if back is None or back == state:
+            if back is None or back.is_same(state):
                 return None
             state = back
 
@@ -123,14 +125,18 @@ class RoutineRunner:
         try:
             self.recording = False
             while True:
-                inside, _ = self._entered(graph, head, after, state)
-                back = None if inside is None else self._region(graph, head + 1, after, inside, [])
-                if back is None or not state.join(back):
+                found: list[ProgramState] = []
+                inside, end = self._entered(graph, head, after, state)
+                back = None if inside is None else self._region(graph, head + 1, after, inside, found)
+                if back is None or not state.join(back, graph.meetings[head]):
                     break
             self.recording = before
-            inside, end = self._entered(graph, head, after, state)
-            if inside is not None:
-                self._region(graph, head + 1, after, inside, ends)
+            if before:
+                found = []
+                inside, end = self._entered(graph, head, after, state)
+                if inside is not None:
+                    self._region(graph, head + 1, after, inside, found)
+            ends += found
         finally:
             self.recording = before
             self._unknown -= 1
@@ -150,19 +156,20 @@ class RoutineRunner:
     ) -> ProgramState | None:
         """As ``_region``, of blocks that go back in any way: each with what holds on all paths that lead to it."""
         before, self.recording = self.recording, False
-        starts, pending = {first: state.copy()}, [first]
+        starts, pending, waiting = {first: state.copy()}, [first], {first}
         while pending:
-            at = min(pending)
-            pending.remove(at)
+            at = heappop(pending)
+            waiting.remove(at)
             for there, after in self._after(graph, at, starts[at].copy()):
                 if not first <= there < stop:
                     continue
                 if there not in starts:
                     starts[there] = after.copy()
-                elif not starts[there].join(after):
+                elif not starts[there].join(after, graph.meetings[there]):
                     continue
-                if there not in pending:
-                    pending.append(there)
+                if there not in waiting:
+                    waiting.add(there)
+                    heappush(pending, there)
         self.recording = before
         leaving: list[ProgramState] = []
         for at in sorted(starts):
@@ -171,14 +178,14 @@ class RoutineRunner:
                     ends.append(after.copy())
                 elif there >= 0 and not first <= there < stop:
                     leaving.append(after.copy())
-        return _joined(leaving)
+        return _joined(leaving, graph.meetings[first, stop])
 
 
-def _joined(states: list[ProgramState]) -> ProgramState | None:
-    """What holds in all of them; None of none."""
+def _joined(states: list[ProgramState], meeting: Meeting) -> ProgramState | None:
+    """What holds in all of them, which meet at ``meeting``; None of none."""
     if not states:
         return None
     found = states[0]
     for other in states[1:]:
-        found.join(other)
+        found.join(other, meeting)
     return found
