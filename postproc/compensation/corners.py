@@ -16,7 +16,7 @@ from postproc.base.geometry import lengths
 from postproc.compensation.approximations import Run, approximations, as_stated
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.problem import CompensationProblem
-from postproc.compensation.rounded_path import RoundedOutput, extents, original_reach, sides_of_output
+from postproc.compensation.rounded_path import RoundedOutput, extents, original_reach
 from postproc.compensation.subdivision import Subdivision, subdivided_motions
 from postproc.toolpath import Role
 
@@ -141,19 +141,17 @@ def rounded_errors(
     task: CompensationProblem, result: CorrectionResult, division: Subdivision
 ) -> tuple[Ints, Floats, Floats]:
     """Motions (K,) of a division that start or end in points of fitted corners, or on which the force changes over a
-    ramp or an axis crosses its gap, and by how much (K,) [m], (K,) [rad] the tool is off along them at most, as they
-    are rounded; on ramps and where axes cross without where no distance is stated."""
+    ramp, and by how much (K,) [m], (K,) [rad] the tool is off along them at most, as they are rounded; on ramps without
+    where no distance is stated."""
     on = result.corrected & task.desired_path.traceable & (task.desired_path.length > 0) & task.carries
     fitted = changing = np.empty(0, np.int64)
     if division.fits is not None:
         fitted = np.unique(np.concatenate([division.fits.point, division.fits.point + 1]))
     if task.force.ramps is not None:
         changing = np.flatnonzero(np.isin(division.source, task.force.ramps.row))
-    run = as_stated(task, division)
-    if (sides := sides_of_output(*run)) is not None:
-        changing = np.union1d(changing, sides.inside(task.model.gaps > 0))
-    changing = np.setdiff1d(changing, fitted)
+        changing = np.setdiff1d(changing, fitted)
     found = []
+    run = as_stated(task, division)
     for motion in (fitted, changing):
         some = motion[on[division.source[motion]] & ~division.transitions[motion]]
 
