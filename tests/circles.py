@@ -143,16 +143,20 @@ class Machine:
     def drawn(self, text, wrench):
         """Places of the tool (S, 3) [mm] in the base, and (S,) whether the force acted, under ``wrench`` (6,) then."""
         places, angles, loaded = commanded(text)
-        places = (places + BASE) / 1000
+        rotations = [turned(*angle) for angle in angles]
+        return self.followed((places + BASE) / 1000, rotations, loaded, wrench), loaded
+
+    def followed(self, places, rotations, loaded, wrench):
+        """The same along places (S, 3) [m] in the robot and rotations (S, 3, 3); loaded (S,): the force acts."""
         # to the first target all axes go at once, as in a jump
-        first = self.motors(places[0], turned(*angles[0]), START)
-        joint = np.minimum(np.maximum(START, first - self.gap / 2), first + self.gap / 2)
-        motor, found = first, []
-        for place, angle, force in zip(places, angles, loaded, strict=True):
-            motor = self.motors(place, turned(*angle), motor)
+        motor = self.motors(places[0], rotations[0], START)
+        joint = np.minimum(np.maximum(START, motor - self.gap / 2), motor + self.gap / 2)
+        found = []
+        for place, rotation, force in zip(places, rotations, loaded, strict=True):
+            motor = self.motors(place, rotation, motor)
             joint = np.minimum(np.maximum(joint, motor - self.gap / 2), motor + self.gap / 2)
             found.append(self.plant.rest(joint, wrench * force, self.tool).position)
-        return np.array(found) * 1000 - BASE, loaded
+        return np.array(found) * 1000 - BASE
 
 
 def form(places):

@@ -7,6 +7,10 @@ import numpy as np
 import pytest
 from circles import BASE, CENTRE, LEAD, POSE, RADIUS, Machine, circle, form, point
 from conftest import CELL
+from judge.cell import Cell
+from judge.path import Path as Way
+from judge.reader import read
+from judge.robot import Robot as JudgedArm
 from test_inverse_general import CELL as GENERAL
 from test_inverse_general import soft
 
@@ -17,6 +21,7 @@ from postproc.model import StiffnessModel
 from postproc.robot.description import find_robot, load_robot
 from postproc.workflows.preparation import Request, prepare
 
+KR270 = find_robot("kuka_kr270")
 GAP = 2e-4
 WRENCH = np.array([1.0, 0, 1, 0, 0, 0])
 LETTERS = {"hysteresis": "w", "backlash": "b"}
@@ -120,6 +125,40 @@ def test_arcs_need_points_at_reversals_and_no_more(compensate, job):
         f"\n5 arcs: circular form error {before():.3f} mm, corrected {without:.3f} mm, with points {after:.4f} mm"
     )
     assert after < before() / 10
+
+
+def rounded_circle(job):
+    """[mm] the largest distance of the tool from the circle on the path that a controller makes of the output, with its
+    parabolas, as the independent judge reads it."""
+    way = Way(
+        read(job.output, Cell.load(job.folder / "cell.yaml")),
+        JudgedArm(KR270),
+        Cell.load(job.folder / "cell.yaml"),
+    )
+    loaded = [i for i, motion in enumerate(way.motions) if not motion.air]
+    low, high = loaded[0] - 2, loaded[-1]
+    label = np.arange(way.start[low], way.start[high + 1], 2e-4)
+    motion, _ = way.find(label, low, high)
+    place, rotation, _ = way.at(label, low, high)
+    tool = machine().followed(place + BASE / 1000, rotation, np.isin(motion, loaded), WRENCH)[
+        motion >= loaded[0]
+    ]
+    return np.hypot(np.hypot(*(tool[:, :2] - CENTRE).T) - RADIUS, tool[:, 2]).max()
+
+
+@pytest.mark.slow
+def test_axes_cross_their_gaps_where_the_rounded_path_lets_them(compensate, job):
+    """What is reported, what ``verify`` finds and what the machine does where points inserted in arcs are rounded."""
+    arm(job, "hysteresis", GAP)
+    source = job.write(circle(arcs=5))
+    done = compensate(source, "--force", "--json", "-")
+    assert done.code == 0
+    reported = done.json["path_error_mm"]["max"]
+    verified = compensate("verify", source, job.output, "--force", "--json", "-").json["compensated"]["max"]
+    cut = rounded_circle(job)
+    print(f"\nreported {reported:.4f} mm, verified {verified:.4f}, on the machine {cut:.4f}")
+    assert verified == pytest.approx(reported, abs=1e-3)
+    assert cut == pytest.approx(reported, abs=1e-3)
 
 
 def straight(steps=60):

@@ -20,6 +20,7 @@ from postproc.compensation.subdivide import subdivide
 from postproc.compensation.subdivision import Limits
 from postproc.languages.krl import KrlDialect
 from postproc.output.write import path_errors_as_written
+from postproc.robot.description import find_robot
 from postproc.toolpath import Arcs, EditConstraints, Kind
 
 FREE = Limits(max_growth=100.0)
@@ -86,6 +87,32 @@ def test_a_program_says_where_its_cuts_begin_corrected(compensate, job):
         shift = read.position[[air, cut]] - np.array([[0, 0, 0], [0.1, 0, -0.002]] if air == 2 else 0.0)
         if air == 2:
             assert np.linalg.norm(shift[0] - shift[1]) < 0.2e-3
+
+
+OFFSETS = """
+  - effect: joint_offset
+    parameters:
+      o1: {value: 3.0e-4, unit: rad, source: made up}
+      o2: {value: -2.0e-4, unit: rad, source: made up}
+"""
+TOUCHED = "touch_points: [[0, 0, 0], [300, 0, 0], [0, 300, 0], [300, 300, 0]]\n"
+
+
+@pytest.mark.parametrize("mode", ["absolute\n", f"touched_off\n{TOUCHED}"], ids=["absolute", "touched_off"])
+def test_a_cut_is_entered_in_air_where_air_is_corrected_as_well(compensate, job, mode):
+    """Nothing is between the motion in air and the cut, which ends and starts under the force; ``verify`` agrees."""
+    known = find_robot("kuka_kr270").read_text().rstrip()
+    (job.folder / "arm.yaml").write_text(known + OFFSETS)
+    cell = CELL.replace("kuka_kr270", "arm.yaml")
+    job.cell(f"{cell}correct: {mode}controller: {{absolute_accuracy: false}}\n")
+    source = job.write(LINES)
+    done = compensate(source, "--force", "--json", "-")
+    assert done.code == 0, done.err
+    assert (done.json["lead_ins"], done.json["stops_added"], done.json["transition_moves"]) == (2, 0, [])
+    checked = compensate("verify", source, job.output, "--force", "--json", "-")
+    assert checked.code == 0, checked.err
+    reported = max(done.json[key]["max"] for key in ("error_after_mm", "path_error_mm"))
+    assert checked.json["compensated"]["max"] == pytest.approx(reported, abs=1e-3)
 
 
 def test_switched_off_air_does_not_lead_in(compensate, job):

@@ -9,13 +9,14 @@ import pytest
 from path_cases import task
 from scipy.spatial.transform import Rotation
 
+from postproc.compensation.approximations import with_distance
 from postproc.compensation.corner_fit import fit_corners
 from postproc.compensation.corners import compare_corners, compare_corners_at
 from postproc.compensation.correct import correct
 from postproc.compensation.path_error import path_errors
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.ramped_forces import add_force_ramps
-from postproc.compensation.rounded_path import RoundedOutput, with_distance
+from postproc.compensation.rounded_path import RoundedOutput
 from postproc.compensation.subdivide import subdivide
 from postproc.compensation.subdivision import Limits, subdivided_motions
 from postproc.compensation.unknown_distance import largest_distance

@@ -16,19 +16,14 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import blocks, in_blocks
 from postproc.base.geometry import Poses, lengths, product, rotation_from_vector
+from postproc.compensation.approximations import approximations, as_stated, stated_alone
 from postproc.compensation.corner_division import CornerDivision, with_corners
 from postproc.compensation.corner_points import PointChooser
 from postproc.compensation.corners import compare_corners_at, evaluate_corners, find_corners, suspect_corners
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.ramp_points import NEVER, LeastPoints, choose_ramp_points
-from postproc.compensation.rounded_path import (
-    Blend,
-    RoundedOutput,
-    approximations,
-    as_stated,
-    stated_alone,
-)
+from postproc.compensation.rounded_path import Blend, RoundedOutput
 from postproc.compensation.subdivision import Limits, Subdivision
 from postproc.toolpath import Role
 

@@ -13,16 +13,10 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import each_block, in_blocks
 from postproc.base.geometry import lengths
+from postproc.compensation.approximations import Run, approximations, as_stated
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.problem import CompensationProblem
-from postproc.compensation.rounded_path import (
-    RoundedOutput,
-    Run,
-    approximations,
-    as_stated,
-    extents,
-    original_reach,
-)
+from postproc.compensation.rounded_path import RoundedOutput, extents, original_reach
 from postproc.compensation.subdivision import Subdivision, subdivided_motions
 from postproc.toolpath import Role
 

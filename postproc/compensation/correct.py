@@ -147,6 +147,31 @@ def correct(task: CompensationProblem) -> CorrectionResult:
     return result if task.gain == 1.0 else with_residual(task, result, result.command)
 
 
+def as_air(result: CorrectionResult, rows: Ints) -> CorrectionResult:
+    """The result with the motions ``rows`` (K,) in air, of which nothing is predicted: what they end at is the start of
+    a cut, and they are not corrected for an end of their own."""
+    if not len(rows):
+        return result
+
+    def with_rows(values: np.ndarray, value: float) -> np.ndarray:
+        changed = np.array(values)
+        changed[rows] = value
+        return changed
+
+    return replace(
+        result,
+        state=with_rows(result.state, MotionOutcome.AIR),
+        cut=with_rows(result.cut, -1),
+        correction=with_rows(result.correction, 0.0),
+        turn=with_rows(result.turn, 0.0),
+        deflection=with_rows(result.deflection, np.nan),
+        before=with_rows(result.before, np.nan),
+        before_angle=with_rows(result.before_angle, np.nan),
+        after=with_rows(result.after, np.nan),
+        after_angle=with_rows(result.after_angle, np.nan),
+    )
+
+
 def _moved(wanted: Poses, shift: Floats, turn: Floats) -> Poses:
     """``wanted`` (K), shifted by (K, 3) [m] and turned by (K, 3) [rad] in place."""
     return Poses(product(rotation_from_vector(turn), wanted.rotation), wanted.position + shift)

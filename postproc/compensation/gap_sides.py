@@ -12,6 +12,9 @@ from postproc.effects import play as operator
 CROSSED = 1.0 - 1e-9
 """Share of a gap or a band that counts as all of it."""
 
+INSIDE = 1.0 - 1e-6
+"""Share of half a gap from which on a motor counts as at its end, but for rounding."""
+
 NO_LENGTH = 1.0
 """[m] Counts as the length of a jump, or of a turn on the spot."""
 
@@ -60,6 +63,12 @@ class GapSides:
     def shares(self) -> Floats:
         """(S, n) as ``at``, of the stations."""
         return operator.share(self.motor, self.joint, self.gap)
+
+    def inside(self, axes: Bools) -> Ints:
+        """Motions (K,) on which one of ``axes`` (n,) is inside of its gap."""
+        crossing = (np.abs(self.shares[:, axes]) < INSIDE).any(axis=1)
+        motions = np.unique(np.floor(0.5 * self.key[crossing]).astype(np.int64))
+        return motions[motions >= 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,6 +187,9 @@ class LostMotion:
     def run(self, gain: float) -> GapSides:
         """As the program runs with the share ``gain`` of its correction made: the motors are not where a joint is
         wanted before they have crossed the gap."""
+        return GapSides.of(self.programmed.key, self.motors(gain), self.programmed.gap, self.restart)
+
+    def motors(self, gain: float) -> Floats:
+        """(S, n) [rad, m] where they are at the stations then."""
         ahead = self.aim + 0.5 * self.gap * self.wanted.at(self.row, self.share) - self.axes
-        motor = self.axes + np.where(self.moved[:, None], gain * ahead, 0.0)
-        return GapSides.of(self.programmed.key, motor, self.programmed.gap, self.restart)
+        return self.axes + np.where(self.moved[:, None], gain * ahead, 0.0)

@@ -19,7 +19,7 @@ from postproc.base.batches import each_block
 from postproc.base.units import DEG, MM
 from postproc.compensation.gap_sides import GapSides, LostMotion, MotorPath, Reversals
 from postproc.compensation.problem import CompensationProblem, rotate_wrench
-from postproc.robot.inverse import inverse
+from postproc.compensation.run_sides import axes_at
 
 ROOM = 0.25
 """Share of the tolerance that the dead band of a reversal may take at the tool."""
@@ -192,12 +192,8 @@ class _AxisPaths:
         inner = np.flatnonzero((along > 0.0) & (along < 1.0))
         if len(inner):
             at, part = row[inner], along[inner]
-            flange = task.desired_path.at(at, part) @ task.tool.shared(at).inverse()
-            if (placed := task.robot_from_path(at, part)) is not None:
-                flange = placed @ flange
             near = q[at - 1] + part[:, None] * (q[at] - q[at - 1])
-            solution = inverse(task.model.robot.nominal, flange, task.track.status[at], near)
-            axes[inner] = np.where(solution.reachable[:, None], solution.q, np.nan)
+            axes[inner] = axes_at(task, at, part, task.desired_path.at(at, part), near)
         return axes
 
     def _aim(self, row: Ints, along: Floats, axes: Floats) -> Floats:

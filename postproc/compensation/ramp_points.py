@@ -15,12 +15,13 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.geometry import PoseRows, lengths
 from postproc.base.units import MM
+from postproc.compensation.approximations import approximations
 from postproc.compensation.corner_division import commands_on_rounded_path
 from postproc.compensation.corner_points import ChosenPoints
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.point_fit import Curves, fit_points
 from postproc.compensation.problem import CompensationProblem
-from postproc.compensation.rounded_path import approximations, original
+from postproc.compensation.rounded_path import original
 from postproc.compensation.subdivision import Limits, Subdivision
 from postproc.toolpath import Role
 

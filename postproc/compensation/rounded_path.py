@@ -9,7 +9,7 @@ that is the quadratic Bezier curve with the end point as its control point.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -17,11 +17,13 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.geometry import Poses, lengths
 from postproc.base.units import MM
+from postproc.compensation.approximations import approximations
 from postproc.compensation.desired_path import interpolate_poses
+from postproc.compensation.gap_sides import GapSides
 from postproc.compensation.path_error import PathSegments
 from postproc.compensation.problem import CompensationProblem
+from postproc.compensation.run_sides import ON_LINE, ON_PARABOLA, Stations, rounded_sides
 from postproc.compensation.subdivision import Subdivision, subdivided_motions
-from postproc.toolpath import Role
 
 ROUNDS, SETTLED = 6, 2e-8
 """Steps in which the place of the path that the tool is nearest to is looked for; [m] a smaller one is none."""
@@ -78,49 +80,6 @@ def extents(segments: PathSegments) -> Floats:
         segments.sweep[arc] * lengths(segments.start.position[arc] - segments.centre[arc]), rise
     )
     return np.maximum(length, NEAREST)
-
-
-def approximations(task: CompensationProblem, division: Subdivision, motions: Ints) -> Floats:
-    """(K,) [m] from where on the ends of ``motions`` (K,) of a division are approximated, NaN where it is not known:
-    as they are written, or before that as inserted motions will be."""
-    if division.blend is not None:
-        return np.asarray(division.blend[motions])
-    source, path = division.source[motions], task.toolpath
-    blend = path.approximation[source].copy()
-    exact = (division.role[motions] == Role.INTERMEDIATE) & (blend == 0)
-    if not path.constraints.exact_stays:
-        blend[exact] = path.constraints.inserted_approximation[source[exact]]
-    return np.where(division.role[motions] == Role.TRANSITION, np.nan, blend)
-
-
-Run = tuple[CompensationProblem, Subdivision]
-"""A program and its output."""
-
-
-def with_distance(task: CompensationProblem, division: Subdivision, distance: float) -> Run:
-    """Both with the approximation ``distance`` [m] where nothing states one."""
-    blend = approximations(task, division, np.arange(len(division)))
-    stated = replace(division, blend=np.nan_to_num(blend, nan=distance))
-    return _with_approximation(task, distance), stated
-
-
-def as_stated(task: CompensationProblem, division: Subdivision) -> Run:
-    """Both without the approximations of which nothing states the distance."""
-    known = np.isfinite(task.toolpath.approximation).all()
-    known = known and np.isfinite(approximations(task, division, np.arange(len(division)))).all()
-    return (task, division) if known else with_distance(task, division, 0.0)
-
-
-def stated_alone(task: CompensationProblem) -> CompensationProblem:
-    """The program without such approximations, for a division that is not written yet."""
-    return _with_approximation(task, 0.0) if np.isnan(task.toolpath.approximation).any() else task
-
-
-def _with_approximation(task: CompensationProblem, distance: float) -> CompensationProblem:
-    path = replace(task.toolpath, approximation=np.nan_to_num(task.toolpath.approximation, nan=distance))
-    other = replace(task, toolpath=path)
-    vars(other)["desired_path"] = task.desired_path  # no approximation changes it
-    return other
 
 
 class RoundedOutput:
@@ -281,8 +240,10 @@ class RoundedOutput:
         """Of the tool under load at the shares (S,) of the segments ``at`` (S,), parabolas included."""
         command = self.commands(self.blend(at, share))
         segments = self.segments[at]
+        sides = sides_of_output(self.task, self.division)
+        came = None if sides is None else sides.at(self.motions[at], share)
         found = deviations(
-            self.task, command, segments.rows, segments.along(share), self._ends_of_cuts(at, share)
+            self.task, command, segments.rows, segments.along(share), self._ends_of_cuts(at, share), came
         )
         air = ~self.task.carries[segments.rows]  # nothing is cut there
         if air.any():
@@ -296,6 +257,58 @@ class RoundedOutput:
         entered = np.append(False, cut[1:] & ~cut[:-1] & flows)
         left = np.append(cut[:-1] & ~cut[1:] & flows, False)
         return np.asarray((entered[at] & (share == 0.0)) | (left[at] & (share == 1.0)))
+
+
+def sides_of_output(task: CompensationProblem, division: Subdivision) -> GapSides | None:
+    """On which side of its gap each axis lies along the motions of a division; None where the model does not ask."""
+    if task.lost_motion is None:
+        return None
+    known = vars(division).get("_sides")
+    if known is None or known[0] is not task:
+        known = vars(division)["_sides"] = task, _sides_of_output(task, division)
+    return known[1]
+
+
+def _sides_of_output(task: CompensationProblem, division: Subdivision) -> GapSides:
+    lost, source = task.lost_motion, division.source
+    assert lost is not None
+    ends = 2.0 * source + np.where(division.transitions, 0.0, division.share)
+    motion = np.searchsorted(ends, 2.0 * lost.row + lost.share - 1e-12)
+    motion = np.where(lost.row < 0, -1, np.minimum(motion, len(division) - 1))
+    first = _first_shares(division)
+    extent = np.maximum(division.share - first, NEAREST)
+    share = np.where(lost.row < 0, 1.0, np.clip((lost.share - first[motion]) / extent[motion], 0.0, 1.0))
+    motor = lost.motors(task.gain)
+    stations = Stations(motion, share, lost.row, lost.share, motor, lost.restart)
+    near = stations.crossing(lost)
+    near = near[(near >= 0) & (near < len(division))]
+    moved = task.desired_path.traceable & (task.desired_path.length > 0) & (task.track.status >= 0)
+    if task.process:
+        moved &= task.carries
+    near = near[moved[source[near]] & ~division.transitions[near]]
+    if not len(near):
+        return stations.sides(lost)
+    output = RoundedOutput(task, division, near)
+    at = output.place(near)
+    before = np.where(at > 0, output.reach[np.maximum(at - 1, 0)], 0.0)[:, None] / output.extent[at, None]
+    after = output.reach[at, None] / output.extent[at, None]
+    line = np.broadcast_to(ON_LINE, (len(near), len(ON_LINE)))
+    shares = np.concatenate([line, before * ON_PARABOLA, 1.0 - after * ON_PARABOLA], axis=1)
+    number, shares = np.repeat(near, shares.shape[1]), shares.ravel()
+    along = first[number] + shares * (division.share - first)[number]
+    none = np.full((len(number), motor.shape[1]), np.nan)
+    added = Stations(number, shares, source[number], along, none, np.zeros(len(number), bool))
+
+    def commands(motions: Ints, share: Floats) -> Poses:
+        return output.commands(output.blend(output.place(motions), share))
+
+    return rounded_sides(task, stations, near, added, commands)
+
+
+def _first_shares(division: Subdivision) -> Floats:
+    """(M,) of the sources' paths, where the motions start."""
+    same = np.append(False, division.source[1:] == division.source[:-1])
+    return np.where(same, np.append(0.0, division.share[:-1]), 0.0)
 
 
 def original_blend(task: CompensationProblem, row: Ints, share: Floats) -> tuple[Ints, Floats, Floats]:
@@ -360,10 +373,16 @@ def _moved(task: CompensationProblem, row: Ints, share: Floats, step: Floats) ->
 
 
 def deviations(
-    task: CompensationProblem, command: Poses, row: Ints, share: Floats, ends: Bools | None = None
+    task: CompensationProblem,
+    command: Poses,
+    row: Ints,
+    share: Floats,
+    ends: Bools | None = None,
+    came: Floats | None = None,
 ) -> Deviations:
     """How the tools at ``command`` (S) under load deviate from the program's path, parabolas included; from row (S,)
-    and share (S,) themselves at the ``ends`` (S,) of cuts.
+    and share (S,) themselves at the ``ends`` (S,) of cuts.  ``came`` (S, n): the sides of their gaps on which the axes
+    lie, those of the place without.
 
     The force belongs to the place of the path that the tool is nearest to, where the path is square to the way to it;
     it is found by secants along the path, from row (S,) and share (S,) on.
@@ -378,7 +397,8 @@ def deviations(
         wanted, tangent = original(task, at, where)
         goal = task.goal(at, wanted, where)
         here = command if len(active) == n else command[active]
-        real = task.simulated(at, here, task.force.along(at, where), share=where, corrected=True)
+        own = None if came is None else came[active]
+        real = task.simulated(at, here, task.force.along(at, where), share=where, corrected=True, came=own)
         shift, turn = task.visible_errors(at, real.pose, goal)
         gap = np.sum(shift * tangent, axis=1)
         if ends is not None:

@@ -66,7 +66,9 @@ def _can_lead(motions: DivisibleMotions, rows: Ints) -> Bools:
         & path.continues[before]
         & path.continues[rows]
     )
-    can &= (motions.full.state[before] == MotionOutcome.AIR) & ~motions.task.carries[before]
+    # without a force it may be corrected for what the robot does by itself
+    in_air = (MotionOutcome.AIR,) if motions.task.process else (MotionOutcome.AIR, MotionOutcome.CORRECTED)
+    can &= np.isin(motions.full.state[before], in_air) & ~motions.task.carries[before]
     can &= feed_motions(path)[before] & (motions.task.track.status[before] >= 0)
     can &= (path.tool[before] == path.tool[rows]) & (
         path.constraints.orientation_programmed[before] == path.constraints.orientation_programmed[rows]

@@ -6,9 +6,9 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.units import MM
+from postproc.compensation.approximations import with_distance
 from postproc.compensation.corners import Corners, compare_corners_at
 from postproc.compensation.problem import CompensationProblem
-from postproc.compensation.rounded_path import with_distance
 from postproc.compensation.subdivision import Subdivision
 
 FIRST = 0.2 * MM

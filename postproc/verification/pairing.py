@@ -37,26 +37,32 @@ class Different(ValueError):
 class Stretches:
     """K stretches of motions under force: rows ``start`` to before ``stop`` (K,); length (K,): their path is known; of
     the others (points of splines, a motion that comes from an unknown place) only the end points are.  lost (L,):
-    motions under force of which neither is known."""
+    motions under force of which neither is known.  air (K,): stretches in air between the others, of which the end
+    points alone count; there are such where every target is corrected."""
 
     start: Ints
     stop: Ints
     length: Bools
     lost: Ints
+    air: Bools
 
     @staticmethod
     def of(task: CompensationProblem) -> Stretches:
         path, n = task.toolpath, len(task.toolpath)
-        moved = task.carries if task.process else task.carries | np.isin(path.kind, (Kind.LIN, Kind.CIRC))
+        on_path = np.isin(path.kind, (Kind.LIN, Kind.CIRC))
+        moved = task.carries if task.process else task.carries | on_path
+        # without any force all that moves along a path is looked at
+        in_air = moved & ~task.carries & task.force.any
         can = moved & path.known & (task.track.status >= 0) & ~np.isin(path.kind, _JUMPS)
-        form = np.where(can, 1 + (task.desired_path.traceable & np.isin(path.kind, (Kind.LIN, Kind.CIRC))), 0)
+        form = np.where(can, np.where(in_air, 3, 1 + (task.desired_path.traceable & on_path)), 0)
         change = np.ones(n, bool)
         change[1:] = (form[1:] != form[:-1]) | ~path.continues[1:]
         start = np.flatnonzero(change)
         stop = np.append(start[1:], n)[: len(start)]
         some = form[start] > 0
         start, stop = start[some], stop[some]
-        return Stretches(start, stop, form[start] == 2, np.flatnonzero(moved & (form == 0)))
+        lost = np.flatnonzero(moved & ~in_air & (form == 0))
+        return Stretches(start, stop, form[start] == 2, lost, form[start] == 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +171,8 @@ def _away(
         feasible = more[np.isfinite(total)]
         at = row + shift + feasible
         distance = _apart(original, run, np.full(len(at), row), at)
-        limit = original.max_correction if row in loose else SAME
+        # in air targets are corrected as well where not the process alone is
+        limit = SAME if original.process and row not in loose else original.max_correction
         other = ~_alike(original, run, np.full(len(at), row), at)
         total[feasible] += np.where(distance <= limit, distance + _OTHER_MOTION * other, np.inf)
     return total

@@ -20,7 +20,9 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints, sums
 from postproc.base.geometry import Poses, lengths, product, rotation_from_vector, turn_between
+from postproc.compensation.gap_sides import GapSides
 from postproc.compensation.problem import CompensationProblem
+from postproc.compensation.run_sides import ON_LINE, ON_PARABOLA, Stations, rounded_sides
 
 _NO_LENGTH = 1e-9
 
@@ -126,6 +128,27 @@ class RunPath:
         two = self._programmed_tangent(vertex, reach * u / length[vertex])
         along = (after.position - before.position) / reach[:, None] + (1 - weight) * one + weight * two
         return np.asarray(along / np.maximum(lengths(along), _NO_LENGTH)[:, None])
+
+    @cached_property
+    def sides(self) -> GapSides | None:
+        """On which side of its gap each axis lies along the path; None where the model does not ask."""
+        lost, path = self.task.lost_motion, self.task.desired_path
+        if lost is None or not self.reach.any():
+            return None if lost is None else lost.programmed
+        stations = Stations(lost.row, lost.share, lost.row, lost.share, lost.axes, lost.restart)
+        near = stations.crossing(lost)
+        near = near[(near >= 0) & (near < len(self.reach))]
+        near = near[path.traceable[near] & (path.length[near] > 0) & (self.task.track.status[near] >= 0)]
+        length = np.where(path.length > 0, path.length, 1.0)
+        before = self.reach[near, None] / length[near, None]
+        after = np.append(self.reach, 0.0)[near + 1, None] / length[near, None]
+        line = np.broadcast_to(ON_LINE, (len(near), len(ON_LINE)))
+        share = np.concatenate([line, before * ON_PARABOLA, 1.0 - after * ON_PARABOLA], axis=1)
+        row = np.repeat(near, share.shape[1])
+        count, share = len(row), share.ravel()
+        motor = np.full((count, lost.axes.shape[1]), np.nan)
+        added = Stations(row, share, row, share, motor, np.zeros(count, bool))
+        return rounded_sides(self.task, stations, near, added, self.at)
 
     def shares(self, rows: Ints, parts: Ints, halves: Ints, opens: Bools) -> tuple[Ints, Floats]:
         """Places along the motions ``rows`` (R,): their numbers among these (S,), ascending, and shares (S,).

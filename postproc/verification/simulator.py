@@ -11,6 +11,7 @@ from postproc.base.arrays import Bools, Floats, Ints, sums
 from postproc.base.geometry import Poses, lengths, turn_between
 from postproc.base.units import MM
 from postproc.compensation.problem import CompensationProblem
+from postproc.toolpath import Kind
 from postproc.verification.pairing import SAME, Pairing
 from postproc.verification.path_grid import PathGrid
 from postproc.verification.run_path import RunPath
@@ -143,12 +144,15 @@ class Simulator:
         path = self.path if run is self.original else RunPath.of(run)
         first, last = start.copy(), stop.copy()
         added = (stop - start) > (cuts.stop - cuts.start)
-        for number in np.flatnonzero(added):
+        for number in np.flatnonzero(added & ~cuts.air):
             first[number] += self._leads(run, int(start[number]), int(cuts.start[number]))
         for number in np.flatnonzero(added & (stop - first > cuts.stop - cuts.start) & has_length):
             last[number] -= self._leads_back(run, int(stop[number]) - 1, int(cuts.stop[number]) - 1)
         outside = np.concatenate([_rows(start, first), _rows(last, stop)])
-        points, wanted, error, turn = self._points(run, last)
+        half = self.original.track.half_turns.rows  # of which one part is added, in air as well
+        turned = np.searchsorted(half, cuts.stop) > np.searchsorted(half, cuts.start)
+        alone = ~has_length & ~(cuts.air & turned)
+        points, wanted, error, turn = self._points(run, first, last)
         samples, change, change_angle = self._dense(run, path, first[has_length], last[has_length], step)
         return Simulation(
             samples,
@@ -157,7 +161,7 @@ class Simulator:
             self._missed(samples),
             outside,
             float(run.desired_path.length[outside].sum()),
-            _rows(first[~has_length], (last - cuts.stop + cuts.start)[~has_length]),
+            _rows(first[alone], (last - cuts.stop + cuts.start)[alone]),
             points,
             wanted,
             error,
@@ -171,7 +175,10 @@ class Simulator:
         such a motion is in air, where nothing but its two ends counts."""
         rows, at = np.array([row]), np.array([wanted])
         start = run.desired_path.start[rows].position - self.original.desired_path.start[at].position
-        if not np.linalg.norm(start) <= SAME or run.desired_path.length[row] > self.original.max_correction:
+        if (
+            not np.linalg.norm(start) <= self._same_in_air
+            or run.desired_path.length[row] > self.original.max_correction
+        ):
             return 0
         return int(self._arrives(run, rows, run.wanted[rows], at, 0.0))
 
@@ -179,9 +186,17 @@ class Simulator:
         """The same after the end of a cut."""
         rows, at = np.array([row]), np.array([wanted])
         end = run.wanted[rows].position - self.original.wanted[at].position
-        if not np.linalg.norm(end) <= SAME or run.desired_path.length[row] > self.original.max_correction:
+        if (
+            not np.linalg.norm(end) <= self._same_in_air
+            or run.desired_path.length[row] > self.original.max_correction
+        ):
             return 0
         return int(self._arrives(run, rows, run.desired_path.start[rows], at, 1.0))
+
+    @property
+    def _same_in_air(self) -> float:
+        """[m] how far places in air may be from those of the original."""
+        return SAME if self.original.process else self.original.max_correction
 
     def _arrives(self, run: CompensationProblem, rows: Ints, command: Poses, at: Ints, share: float) -> bool:
         """Whether the tool is where ``at`` of the original starts (share 0) or ends, under the force there."""
@@ -191,19 +206,36 @@ class Simulator:
         away = lengths(real.pose.position - goal.position)
         return bool((away <= self.original.tolerance).all())
 
-    def _points(self, run: CompensationProblem, last: Ints) -> tuple[Ints, Ints, Floats, Floats]:
+    def _air(self, first: Ints, last: Ints) -> list[tuple[Ints, Ints]]:
+        """Of each stretch in air, its rows and those of the run, ``first`` to before ``last`` (K,), that correspond to
+        them: what is added lies before the first motion that turns the tool by half a turn, else before all."""
+        cuts, pairs = self.pairing.stretches, []
+        for number in np.flatnonzero(cuts.air).tolist():
+            rows = np.arange(cuts.start[number], cuts.stop[number])
+            half = np.isin(rows, self.original.track.half_turns.rows)
+            before = np.arange(len(rows)) < (np.argmax(half) if half.any() else 0)
+            pairs.append(
+                (rows, np.where(before, first[number] - rows[0], last[number] - rows[-1] - 1) + rows)
+            )
+        return pairs
+
+    def _points(self, run: CompensationProblem, first: Ints, last: Ints) -> tuple[Ints, Ints, Floats, Floats]:
         """Rows of the run whose end points alone are looked at, those of the original, and how far these are off [m]
         and turned [rad]."""
         original, cuts = self.original, self.pairing.stretches
-        lone = np.flatnonzero(~cuts.length)
+        lone = np.flatnonzero(~cuts.length & ~cuts.air)
         wanted = [_rows(cuts.start[lone], cuts.stop[lone])]
         rows = [_rows((last - cuts.stop + cuts.start)[lone], last[lone])]
         if not original.process:  # in air as well, every target is corrected
             path = original.toolpath
-            known = path.known & ~path.on_axes & (original.track.status >= 0)
-            some = known[self.pairing.air]
-            wanted.append(self.pairing.air[some])
-            rows.append((self.pairing.air if run is original else self.pairing.run_air)[some])
+            in_air = np.concatenate([self.pairing.air, *(part[0] for part in self._air(first, last))])
+            there = np.concatenate([self.pairing.run_air, *(part[1] for part in self._air(first, last))])
+            # a motion that leads to a cut ends where that starts, which is looked at there
+            leads = np.isin(in_air + 1, cuts.start[cuts.length]) & (path.kind[in_air] == Kind.LIN)
+            some = path.known & ~path.on_axes & (original.track.status >= 0)
+            some = some[in_air] & ~leads
+            wanted.append(in_air[some])
+            rows.append((in_air if run is original else there)[some])
         row, at = np.concatenate(rows), np.concatenate(wanted)
         if not len(row):
             return row, at, np.zeros(0), np.zeros(0)

@@ -116,7 +116,8 @@ def place_tool(
 
     def solved(some: Ints, interval: Ints, part: Floats) -> PlacedTool:
         there = path.at(motion[some], share[some])
-        here = _Solution(grid, path.task, motion[some], share[some], there, low[some], high[some])
+        came = None if path.sides is None else path.sides.at(motion[some], share[some])
+        here = _Solution(grid, path.task, motion[some], share[some], there, came, low[some], high[some])
         here.find(interval, part)
         here.turn_on_the_spot()
         row, share_there = grid.place(here.interval, here.part)
@@ -179,9 +180,12 @@ class _Solution:
         motion: Ints,
         share: Floats,
         command: Poses,
+        came: Floats | None,
         low: Ints,
         high: Ints,
     ) -> None:
+        """``came`` (S, n): on which side of their gaps the axes lie, None where nothing asks."""
+        self.came = came
         self.grid, self.task, self.motion, self.share, self.command = grid, run, motion, share, command
         self.low, self.high = low, high
         count = len(motion)
@@ -278,10 +282,12 @@ class _Solution:
         """Where the tools of ``active`` are; the first solution is the start of the next."""
         motion, share, command = self.motion[active], self.share[active], self.command[active]
         if self.q is None:  # asked for all
-            real = self.task.simulated(motion, command, wrench, share=share)
+            real = self.task.simulated(motion, command, wrench, share=share, came=self.came)
             self.q, self.displacement = real.q.copy(), real.displacement.copy()
             return real
-        real = self.task.simulated(motion, command, wrench, self.displacement[active], self.q[active], share)
+        came = None if self.came is None else self.came[active]
+        start, q = self.displacement[active], self.q[active]
+        real = self.task.simulated(motion, command, wrench, start, q, share, came=came)
         self.displacement[active] = real.displacement
         return real
 

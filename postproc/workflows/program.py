@@ -20,7 +20,7 @@ from postproc.base.memory import release_free_memory
 from postproc.base.paged_memory import large_arrays_in_files
 from postproc.compensation.axis_limits import check_limits
 from postproc.compensation.corner_fit import corners_not_improved, fit_corners
-from postproc.compensation.correct import MotionOutcome, correct
+from postproc.compensation.correct import MotionOutcome, as_air, correct
 from postproc.compensation.path_comparison import cuts_not_improved
 from postproc.compensation.ramp_points import LeastPoints
 from postproc.compensation.subdivide import subdivide
@@ -282,6 +282,7 @@ def _corrected(
             )
         release_free_memory()
         division = subdivide(task, result, allowed)
+        result = as_air(result, division.lead_ins)
         release_free_memory()
         result, division = fit_corners(task, result, division, allowed, least)
         release_free_memory()

@@ -131,7 +131,7 @@ def _path_comparison(
         approaches=len(simulation.approaches),
         approach_length=simulation.approach_length,
         unknown_corners=simulation.unknown,
-        points_alone=int((cuts.stop - cuts.start)[~cuts.length].sum()),
+        points_alone=int((cuts.stop - cuts.start)[~cuts.length & ~cuts.air].sum()),
         skipped=simulation.skipped,
         converged=simulation.converged,
         worst=_worst(simulator, ready, simulation),
