@@ -107,7 +107,8 @@ def test_a_motion_that_is_exact_anyway_is_not_told():
 
 
 def test_a_stop_before_the_first_motion_and_after_the_last():
-    assert blends("WAIT SEC 1\n" + between("I=2") + "WAIT SEC 1\n") == [2, 2, 2, 2]
+    assert blends("WAIT SEC 1\n" + between("I=2")) == [2, 2, 2, 2]
+    assert blends(between("I=2") + "WAIT SEC 1\n") == [2, 2, 2, 0]
 
 
 def test_no_motion_is_planned_ahead():

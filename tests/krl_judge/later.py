@@ -59,6 +59,7 @@ class Later(Data):
             f"TOOL_DATA[2]={self.aggregate(plain=True)}",
             "$VEL.CP=0.25",
             "BAS(#VEL_CP,0.25)",
+            "$OV_PRO=30",
             "BAS(#BASE,3)",
             f"list[1]={self.aggregate(plain=True)}",
         ]

@@ -16,6 +16,37 @@ class Misreading:
 
 MISREADINGS = (
     Misreading(
+        "counters",
+        "The counter of a FOR that its own statements set goes on from what they set.",
+        Case(
+            "DEF part()\n"
+            "DECL INT i\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "FOR i=1 TO 7 STEP 2\n"
+            "i=i+1\n"
+            "LIN {X i,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "ENDFOR\n"
+            "END\n"
+        ),
+    ),
+    Misreading(
+        "override",
+        "$OV_PRO slows the motions behind it down, in subprograms too.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "$VEL.CP=1\n"
+            "slower()\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n"
+            "DEF slower()\n"
+            "$OV_PRO=50\n"
+            "END\n"
+        ),
+    ),
+    Misreading(
         "constant after axes",
         "With $ORI_TYPE=#CONSTANT a LIN after an axis motion keeps the orientation of that motion, whatever its text"
         " states; a partial point behind it is read with the angle of the text.",

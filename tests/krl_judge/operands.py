@@ -10,7 +10,7 @@ INPUTS = (1, 2, 3)
 
 @dataclass
 class Names:
-    """What a routine can use.  ``counters``: variables of loops, which nothing else sets."""
+    """What a routine can use.  ``counters``: variables of loops, which nothing else but their loop sets."""
 
     ints: list[str] = field(default_factory=list)
     reals: list[str] = field(default_factory=list)

@@ -11,7 +11,7 @@
                  frame; BAS(#BASE,..); $BASE.X=; BASE_DATA[n]=
     assignment = a number, a truth, a frame, a component, an element; constants, expressions, and values from inputs
     if, switch = on constants, on variables, on inputs
-    for        = constant bounds, STEP, or a bound from a variable that inputs decide
+    for        = constant bounds, STEP, or a bound from a variable that inputs decide; some set their own counter
     while ..   = a counter, or inputs, with EXIT in them
     call       = subprogram with parameters :IN and :OUT, with and without motions, that set frames or module variables;
                  what comes back is a variable, a component, an element with a computed index, a frame or speed in force
@@ -20,7 +20,7 @@
     jump       = IF .. THEN GOTO over what follows, or back as long as a counter or an input says
     form       = an inline form: FDAT, LDAT or PDAT, BAS(#CP_PARAMS,..), a point of the .dat
     idle       = HALT, WAIT SEC, WAIT FOR, $OUT[n]= (all stop the advance run), behind CONTINUE or not; a comment
-    state      = $VEL.CP, $APO.CDIS, $ORI_TYPE, BAS(#VEL_CP,..)
+    state      = $VEL.CP, $APO.CDIS, $ORI_TYPE, BAS(#VEL_CP,..), $OV_PRO
 
 Every local variable is set before it is read, as far as the flow does not skip it.  Subprograms call later ones only.
 """
@@ -186,6 +186,7 @@ class Generator(Later):
             "$ORI_TYPE=#VAR",
             "$ORI_TYPE=#JOINT",
             rng.choice(["$ORI_TYPE=#CONSTANT", "$ORI_TYPE=#VAR"]),
+            rng.choice(["$OV_PRO=50", "$OV_PRO=100", "$OV_PRO=mi"]),
         ]
         return [rng.choice(states)]
 
@@ -299,7 +300,7 @@ class Generator(Later):
             return self.motion()
         counter = names.free.pop()
         first, last, step = rng.choice(
-            [(1, "3", ""), (1, "2", ""), (3, "1", " STEP -1"), (1, "3", " STEP 2"), (2, "1", "")]
+            [(1, "3", ""), (1, "2", ""), (3, "1", " STEP -1"), (1, "7", " STEP 2"), (2, "1", "")]
         )
         before = []
         if names.ints and rng.random() < 0.3:
@@ -315,6 +316,9 @@ class Generator(Later):
         if rng.random() < 0.15:
             body += [f"IF {self.condition()} THEN", "EXIT", "ENDIF", *self.motion()]
         names.counters.remove(counter)
+        if rng.random() < 0.2:
+            ahead = f"{counter}={counter}{'-' if step.endswith('-1') else '+'}1"
+            body[:0] = [ahead] if rng.random() < 0.5 else [f"IF {self.condition()} THEN", ahead, "ENDIF"]
         if before:
             names.ints.append(before[0].partition("=")[0])
         names.free.append(counter)

@@ -13,6 +13,7 @@ ZERO = dict.fromkeys(FRAME, 0.0)
 SYSTEM = {
     "$BASE": "FRAME", "$TOOL": "FRAME", "$VEL": "CP", "$APO": "APO", "$ORI_TYPE": "word", "$CIRC_TYPE": "word",
     "$IPO_MODE": "word", "$ADVANCE": "INT", "FDAT_ACT": "FDAT", "LDAT_ACT": "LDAT", "PDAT_ACT": "PDAT", "$LOAD": "LOAD",
+    "$OV_PRO": "INT",
 }  # fmt: skip
 
 
@@ -71,6 +72,14 @@ class Robot:
         elif command not in ("#VEL_PTP", "#ACC_PTP", "#ACC_CP"):
             raise Stop(f"BAS({command})")
 
+    def speed(self) -> float | None:
+        """[m/s] that of the path, with the override that the program sets; 100 % are set from outside."""
+        speed, override = _number(self.system["$VEL"].parts["CP"].value), self.system["$OV_PRO"]
+        if not is_set(override) or speed is None:
+            return speed
+        share = _number(override.value)
+        return None if share is None else speed * share / 100.0
+
     def frame(self, name: str, number: object) -> None:
         if isinstance(number, bool) or not isinstance(number, int):
             raise Stop("the number of a frame")
@@ -128,7 +137,7 @@ class Robot:
         self.executed.append(
             Executed(
                 line, motion.kind, target, None, base, tool, origin,
-                feed=_number(self.system["$VEL"].parts["CP"].value),
+                feed=self.speed(),
                 approximation=self.distance(motion.rounds),
                 ori_type=str(ori_type) if ori_type is not None else None, arc=found_arc,
             )

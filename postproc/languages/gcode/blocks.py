@@ -36,6 +36,8 @@ FRAMED = {
     Group.DIAMETER: "diameters (G7)",
     Group.LENGTHS: "an offset that the program computes",
     Group.FOREIGN: "those of an unknown mode",
+    Group.CARRIER: "those of a tool whose offsets the control turns (TCARR)",
+    Group.OFFSETS: "those of a tool whose length the program adds to (TOFFL, DL)",
 }
 """Modes in which words are no coordinates of the base."""
 

@@ -62,14 +62,14 @@ _COMMON = _codes(
     (Group.ONCE, Once.DWELL, (4,)),
     (Group.ONCE, Once.SETTING, (10, 11)),
     (Group.ONCE, Once.HOME, (28, 29, 30)),
-    (Group.ONCE, Once.OTHER, (22, 23)),
+    (Group.ONCE, Once.OTHER, (22,)),
     (Group.ONCE, Once.STORE, (28.1, 30.1)),
     (Group.ONCE, Once.PROBE, (31, 37, 38.2, 38.3, 38.4, 38.5)),
     (Group.ONCE, Once.LOCAL, (52,)),
     (Group.ONCE, Once.MACHINE, (53,)),
     (Group.ONCE, Once.SHIFT, (92,)),
     (Group.ONCE, Once.UNSHIFT, (92.1,)),
-    (Group.NONE, 0, (9, 62, 63, 103, 187)),
+    (Group.NONE, 0, (9, 23, 62, 63, 103, 187)),
     # Codes of Fanuc that have no other meaning in LinuxCNC.
     (Group.TURNED, 1, (68, 68.1, 68.2, 68.3, 68.4, 254)),
     (Group.TURNED, 0, (69, 69.1, 255)),
@@ -97,7 +97,7 @@ _TIP = {
 
 _ARGUMENTS = {
     **dict.fromkeys(
-        (71, 431, 510, 511, 501, 660, 661, 680, 681, 682, 683, 684, 1070),
+        (71, 109, 431, 510, 511, 501, 660, 661, 680, 681, 682, 683, 684, 1070),
         (ModalCode(Group.ONCE, Once.OTHER),),
     ),
     500: (ModalCode(Group.ONCE, Once.SHIFT),),
@@ -134,6 +134,7 @@ LINUXCNC = Control(
     # CENTER_ARC_RADIUS_TOLERANCE_MM and _INCH of its interp_internal.hh
     radius_gap=(0.02e-3 * math.sqrt(2), 0.002 * 25.4e-3 * math.sqrt(2)),
     drills=_DRILLS,
+    states_tool=61,
 )
 """LinuxCNC, and ISO code that is of no other control."""
 
@@ -156,6 +157,16 @@ FANUC = Control(
             (Group.TCP, 1, (43.4, 43.5, 234)),
             (Group.LENGTHS, 1, (43.1, 43.2, 43.3, 43.7, 44, 45, 46, 47, 48)),
             *((Group.OFFSET, 101 + n, (110 + n,)) for n in range(20)),
+            (Group.MOTION, Move.THREAD, (32, 35, 36)),
+            (
+                Group.RADIUS,
+                1,
+                (*(41 + n / 10 for n in range(2, 7)), *(42 + n / 10 for n in range(2, 7)), 141),
+            ),
+            (Group.LENGTHS, 1, (43.8, 43.9, 143)),
+            (Group.TURNED, 1, (68.5, 68.6)),
+            (Group.DIAMETER, 1, (10.9,)),
+            (Group.FOREIGN, 1, (7, 51.2, 54.2, 54.4)),
             (Group.FOREIGN, 1, (7.1, 107, 112, 12.1)),
             (Group.FOREIGN, 0, (113, 13.1)),  # G113 only where such a mode is in force, see modal
         ),

@@ -42,6 +42,11 @@ class Group(IntEnum):
     AXIAL = 21  # 0; else targets are axis positions, or reached as the axes go (PTP)
     ONCE = 22  # Once
     NONE = 23  # known, states nothing about the path
+    CARRIER = 25  # 0; else the control turns the tool's offsets (TCARR)
+    ROUNDING = 26  # 0; else the control rounds corners (RNDM)
+    OFFSETS = 27  # 0; else an offset of the tool's length that the program adds (TOFFL)
+    OVERRIDE = 28  # 0; else F is not the feed (OVR)
+    FEED_AXES = 29  # 0 F is that of X, Y, Z; else of other axes too, or not of all (FGROUP)
     EULER = 40  # what A2= B2= C2= are: 0 Euler angles (Z X' Z''), 1 RPY angles (Z Y' X'')
 
 
@@ -193,7 +198,7 @@ class Control:
     word belongs to a code of its block or to its motion; expressions: the language of its variables and
     expressions, None where these are not read; radius_gap [m]: by how much the radii of an arc at its start and end may
     differ where mm and where inch are in force; drills: codes of the cycles that go to R, to the depth that the axis
-    normal to the plane states, and back.
+    normal to the plane states, and back.  states_tool: the M code whose Q is the number of the tool that is loaded.
     """
 
     name: str
@@ -225,3 +230,4 @@ class Control:
     expressions: ExpressionLanguage | None = None
     radius_gap: tuple[float, float] = (1e-5, 1e-5)
     drills: frozenset[int] = frozenset()
+    states_tool: int | None = None

@@ -12,6 +12,7 @@ from postproc.languages.gcode.blocks import AXES, BlockWords
 from postproc.languages.gcode.control import Group, Once
 from postproc.languages.gcode.correctability import UNUSED, code_name
 from postproc.languages.gcode.execution_flow import CALLS, FlowReason
+from postproc.languages.gcode.numbered import written_lengths
 from postproc.languages.gcode.words import How, key
 
 KNOWN_M = (
@@ -96,8 +97,10 @@ def diagnostics(
         "GCO024",
         "the program writes a work offset; the cell's base of its number is used",
     )
+    data = given.noted("tool data")
+    data[[block for block, _ in written_lengths(given)]] = True
     add(
-        given.noted("tool data"),
+        data,
         "GCO024",
         "the program writes data of tools; the cell's tool of the same number is used",
     )
@@ -134,5 +137,8 @@ def diagnostics(
         add(whole, "GCO022", f"words without a decimal point are mm or inch in {given.control.name}")
     height = given.number(key("H"))
     other = (height > 0) & (modal.force[Group.LENGTH] == 1) & (height != loaded) & (loaded > 0)
+    if given.control.offsets is not None:
+        edges = given.number(given.control.offsets) > 1
+        add(edges, "GCO023", "D is not the first edge of the tool; the length of the cell's tool is used")
     add(other, "GCO023", "H has another number than the tool; the length of the cell's tool is used")
     return findings

@@ -61,6 +61,9 @@ class Feeds:
         timed = np.where(length > 0, length, np.nan) * np.where(own > 0, own, np.nan)
         result = np.where(here == Feed.INVERSE_TIME, timed, result)
         result[here < 0] = np.nan
+        for group in (Group.OVERRIDE, Group.FEED_AXES):
+            result[self._force[group][blocks] != 0] = np.nan
+        result[self._given.noted("feed")[blocks]] = np.nan
         return np.asarray(result / 60.0)
 
     def speeds(self, blocks: Ints) -> Floats:

@@ -48,6 +48,8 @@ _ARGUMENTS = np.array(
 _FORGOTTEN = (Group.MOTION, Group.PLANE, Group.DISTANCE, Group.FEED, Group.OFFSET)
 """What other code leaves in another state; that it leaves units, a tool radius or what I J K are in another one is not
 assumed."""
+CALLING_M = (96, 97, 98, 99, 198)
+"""M codes that have a P."""
 _FARTHEST_OFFSET = 1e6
 """No control numbers its offsets so far."""
 
@@ -135,7 +137,7 @@ def modal(execution: Execution, control: Control, base: int | None = None) -> Mo
     strange = WordColumn(blocks[odd], codes.value[odd], codes.how[odd])
 
     flow = follow(execution, control, once)
-    groups, values = _offsets(source, number, groups, values, blocks)
+    groups, values = _offsets(source, control, number, groups, values, blocks)
     groups, values = _polar_or_offset(flow, number, groups, values, blocks)
     start = {**_START, **control.start, **({} if base is None else {Group.OFFSET: base})}
     force: dict[Group, Ints] = {}
@@ -244,9 +246,18 @@ class _Also:
         return some, meant
 
 
-def _offsets(source: Source, number: Ints, groups: Ints, values: Ints, blocks: Ints) -> tuple[Ints, Ints]:
+def _offsets(
+    source: Source, control: Control, number: Ints, groups: Ints, values: Ints, blocks: Ints
+) -> tuple[Ints, Ints]:
     """Groups and values with the offsets that a word P or H gives."""
     numbered = (groups == Group.OFFSET) & (values >= 100)
+    if control.increments and (first := (groups == Group.OFFSET) & (number == 540)).any():
+        # G54 P is G54.1 P of a Fanuc, where no other code of the block has the P
+        m = source.column(key("M"))
+        taken = np.zeros(len(source.blocks), np.bool_)
+        taken[m.block[np.isin(m.value, CALLING_M)]] = True
+        taken[blocks[(groups == Group.ONCE) | (groups == Group.MACRO) | (number == 640)]] = True
+        numbered |= first & (source.mask(key("P")) & ~taken)[blocks]
     if numbered.any():
         given = source.column(key("P")).last(blocks)
         fine = (given >= 0) & (given < _FARTHEST_OFFSET)

@@ -24,8 +24,12 @@ OFFSET_LEVELS = (2.0, 20.0)
 LENGTH_CODES = (43.0, 43.4, 43.5, 234.0)
 SYSTEM = ((5201, 5400), (7001, 7999), (14001, 20000))
 """Variables that are work offsets: of Fanuc and Haas (7001, 14001: G54.1 Pn), 5211 to 5400 of LinuxCNC."""
+LENGTHS = ((2000, 2200), (2200, 2400), (10000, 10999), (11000, 11999))
+"""Variables of a Fanuc behind the first number are lengths of tools, or the wear of these, up to the second."""
 
-_BASE_FRAME = re.compile(r"\$P_(?:(?!PFRAME)[A-Z]*FRAME|UBFR|CHBFR|NCBFR)(?![A-Z])", re.I)
+_BASE_FRAME = re.compile(
+    r"\$(?:P_(?:(?!PFRAME)[A-Z0-9]*FRAME|(?!UIFR)[A-Z0-9]*FR)|AA_(?:OFF|ETRANS|DRF))(?![A-Z])", re.I
+)
 """Variables of a Sinumerik that move all work offsets; $P_UIFR is one of these, $P_PFRAME the programmed frame."""
 _WRITTEN_BASE = re.compile(r"\$P_UIFR(?:[ \t]*+\[[ \t]*+(\d{1,4}+)[ \t]*+[\],])?+", re.I)
 _WRITTEN_TOOL = re.compile(
@@ -203,19 +207,35 @@ def tools(given: BlockWords, loaded: int | None = None) -> tuple[Ints, bool]:
     changes = m.block[m.value == TOOL_CHANGE]
     tape, sure = given.modal.flow.tape, given.modal.flow.reason == FlowReason.NONE
     changes = changes[tape[changes]]
+    stated = _stated_tools(given)
     # The last T of a block counts.
     counts = np.append(column.block[1:] != column.block[:-1], True)[: len(column)] & tape[column.block]
     named = np.flatnonzero(counts & ((column.value != 0) | (len(changes) > 0)))
-    if not (column.value[named] != 0).any():
+    if not (column.value[named] != 0).any() and not len(stated[0]):
         alone = everywhere(1 if loaded is None else loaded, n, np.int32)
         return _without_rewritten(given, alone), loaded is not None
     block, number = column.block[named], column.value[named]
     whole = (number > 0) & (number == np.floor(number)) & sure[block] & (number < 1e9)
-    chosen = fill_modal(n, block, np.where(whole, number, -1).astype(np.int32), first, np.int32)
-    if not len(changes):
-        return _without_rewritten(given, chosen), True
-    changed = fill_modal(n, changes, np.where(sure[changes], chosen[changes], -1), first, np.int32)
-    return _without_rewritten(given, changed), True
+    loads = block, np.where(whole, number, -1).astype(np.int32)
+    if len(changes):
+        chosen = fill_modal(n, *loads, first, np.int32)
+        loads = changes, np.where(sure[changes], chosen[changes], -1)
+    at, which = (np.concatenate(pair) for pair in zip(loads, stated, strict=True))
+    order = np.argsort(at, kind="stable")
+    return _without_rewritten(given, fill_modal(n, at[order], which[order], first, np.int32)), True
+
+
+def _stated_tools(given: BlockWords) -> tuple[Ints, Ints]:
+    """Blocks (K,) that say which tool is loaded, without loading it (M61 Q2), and its numbers (K,), -1 if unknown."""
+    code, m = given.control.states_tool, given.words(key("M"))
+    at = m.block[m.value == code] if code is not None else np.empty(0, np.int64)
+    if not len(at):
+        return at, np.empty(0, np.int32)
+    flow, number = given.modal.flow, given.number(key("Q"))[at]
+    whole = (
+        (number > 0) & (number == np.floor(number)) & (number < 1e9) & (flow.reason[at] == FlowReason.NONE)
+    )
+    return at[flow.tape[at]], np.where(whole, number, -1).astype(np.int32)[flow.tape[at]]
 
 
 def _without_rewritten(given: BlockWords, tool: Ints) -> Ints:
@@ -223,11 +243,27 @@ def _without_rewritten(given: BlockWords, tool: Ints) -> Ints:
     lost: dict[int | None, int] = {}
     for block, number in _rewritten(given, "tool data", _WRITTEN_TOOL, tool):
         lost.setdefault(number, block)
+    moving = np.flatnonzero(given.motion)
+    for block, number in written_lengths(given):
+        used = moving[tool[moving] == number]
+        if len(used) and used[0] < block:
+            lost[number] = min(block, lost.get(number, block))
     if not lost:
         return tool
     numbers, which = np.unique(tool, return_inverse=True)
     until = np.array([min(lost.get(one, len(tool)), lost.get(None, len(tool))) for one in numbers.tolist()])
     return np.where(np.arange(len(tool)) < until[which], tool, np.int32(-1))
+
+
+def written_lengths(given: BlockWords) -> Iterator[tuple[int, int]]:
+    """Blocks that write a variable of a Fanuc that is the length of a tool or its wear, and the tool's number."""
+    for note in given.source.notes if given.control.increments else ():
+        target = _TARGET.match(note.text) if note.kind == "assign" else None
+        if target is None or not (target[1] or "").isdigit():
+            continue
+        for low, high in LENGTHS:
+            if low < int(target[1][:9]) <= high:
+                yield note.block, int(target[1][:9]) - low
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,6 +298,13 @@ def tool_lengths(given: BlockWords, tool: Ints) -> ToolLengths:
             # Fanuc takes a new length at once, LinuxCNC with the next G43
             changes[written] |= given.control.increments
         off &= np.maximum.accumulate(force == 1)
+        if given.control.increments:  # length number 0 is none
+            h = given.words(key("H"))
+            own = ~given.modal.has(Once.CALL, Once.SETTING)[h.block]
+            numbers = np.nan_to_num(h.value[own], nan=-1.0).clip(-1, 1e9).astype(np.int32)
+            none = fill_modal(n, h.block[own], numbers, -1, np.int32) == 0
+            off = off | (none & (force == 1))
+            changes |= switched(none.astype(np.int8), 0)
     else:
         off = everywhere(False, n)
     m = given.words(key("M"))
@@ -272,7 +315,9 @@ def tool_lengths(given: BlockWords, tool: Ints) -> ToolLengths:
         chosen = fill_modal(n, edge.block, np.nan_to_num(edge.value, nan=-1.0).astype(np.int32), 1, np.int32)
         changes |= switched(chosen, 1)
         changes[edge.block[np.isnan(edge.value)]] = True
-        off = off | (chosen == 0)
+        named = given.words(key("T"))
+        none = fill_modal(n, named.block, (named.value == 0).astype(np.int8), 0, np.int8)
+        off = off | (chosen == 0) | (none == 1)
     return ToolLengths(changes, off)
 
 

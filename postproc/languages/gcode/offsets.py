@@ -42,7 +42,8 @@ def one_shift(event: Event) -> ProgrammedFrame:
 
 
 def two_shifts(event: Event) -> ProgrammedFrame:
-    """Fanuc: the local shift of G52 and that of G92 add up; G92.1 clears the latter."""
+    """Fanuc: the local shift of G52 and that of G92 add up; G92.1 clears both along the axes that it names with 0
+    (programming manuals, "workpiece coordinate system preset")."""
     frame = event.frame
     local = np.zeros(6) if frame.memory is None else frame.memory
     given, mentioned = _given(event)
@@ -52,7 +53,11 @@ def two_shifts(event: Event) -> ProgrammedFrame:
         return replace(frame, shift=rest + local, memory=local)
     if event.once & (1 << Once.SHIFT):
         return replace(frame, shift=np.where(mentioned, event.position - given, frame.shift), memory=local)
-    return replace(frame, shift=local, memory=local)
+    named = (
+        mentioned if mentioned.any() else np.abs(frame.shift) + np.abs(local) > 0
+    )  # of none it is not known
+    cleared = np.where(mentioned & (given == 0), 0.0, np.nan)
+    return replace(frame, shift=np.where(named, cleared, frame.shift), memory=np.where(named, cleared, local))
 
 
 def _given(event: Event) -> tuple[Floats, Floats]:

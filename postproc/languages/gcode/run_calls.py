@@ -101,6 +101,8 @@ class RunCalls(RunState):
                 else (*part, 1 if math.isnan(count) else int(count), self.variables.own())
             )
         number, count = self.word(block, "P"), self.word(block, "L")
+        if verb == "call" and not math.isnan(self.word(block, "Q")):
+            return None  # it starts at a block of the subprogram
         if math.isnan(number) or number != math.floor(number):
             return None
         runs = 1 if math.isnan(count) else int(count)

@@ -22,19 +22,22 @@ NAMED_WORDS: Mapping[bytes, int] = {b"CR": key("R"), b"TURN": TURN, b"RPL": RPL}
 """Addresses of several letters whose numbers say where a motion goes."""
 
 ACTIONS = (b"SPOS", b"SPOSA", b"M", b"H")
-CORNERS = frozenset(b"CHR CHF RND RNDM".split())
+CORNERS = frozenset(b"CHR CHF RND".split())
 POLAR = frozenset(b"AP RP AR ANG".split())
-POSITIONS = frozenset(b"POS POSA POSP MOV".split())
-"""``POS[X]=``: an axis moves by itself."""
+POSITIONS = frozenset(b"POS POSA POSP MOV AX OS FXS".split())
+"""``POS[X]=``: an axis moves by itself, by a computed name, to and fro, or up to a stop."""
 
 SETTINGS = frozenset(
-    b"ADIS ADISPOS CTOL OTOL ATOL FGREF FL FA FB FD FZ FRC FRCM ACC OVR OVRA OVRRAP ACCLIMA JERKLIMA VELOLIMA STAT TU "
-    b"SF SD SR SRA STA SVC FP FMA DISC DISR DISCL LIMS MEAC THETA PHI PSI ID IDS DC FXS FXST FXSW FOC".split()
+    b"ADIS ADISPOS CTOL OTOL ATOL FGREF FL FA FD FZ FRC FRCM ACC OVRA OVRRAP ACCLIMA JERKLIMA VELOLIMA STAT TU "
+    b"TOFFR SF SD SR SRA STA SVC FP FMA DISC DISR DISCL LIMS MEAC THETA PHI PSI DC FXST FXSW FOC".split()
 )
 """Addresses that say nothing of where a motion goes."""
 
-LENGTHS = frozenset(b"TOFF TOFFL TOFFR TOFFLR TCARR".split())
-"""Addresses that change the length of the tool, as another D does."""
+SWITCHES: Mapping[bytes, bytes] = {
+    b"TOFF": b"TOFF", b"TOFFL": b"TOFF", b"TOFFLR": b"TOFF", b"DL": b"TOFF", b"TCARR": b"TCARR", b"RNDM": b"RNDM",
+    b"OVR": b"OVR",
+}  # fmt: skip
+"""Addresses that hold on, and are off at 0 (OVR at 100) -> the name of the two states."""
 
 DRILLING = frozenset(f"CYCLE{number}".encode() for number in range(81, 90))
 """Cycles that end in their retraction plane, above where they start."""
@@ -46,7 +49,7 @@ MILLING = frozenset(
 """Cycles that end elsewhere; as all of the control's cycles they bring back the modes in force before them."""
 
 QUIET_CALLS = frozenset(
-    b"MSG CYCLE832 FGROUP SETMS SETAL BRISKA SOFTA DRIVEA JERKA WORKPIECE GROUP_BEGIN GROUP_END GROUP_ADDEND WAITM "
+    b"MSG CYCLE832 SETMS SETAL BRISKA SOFTA DRIVEA JERKA WORKPIECE GROUP_BEGIN GROUP_END GROUP_ADDEND WAITM "
     b"WAITMC WAITE WAITS WAITP INIT START CLEARM SETM CLEAR DISPLOF DISPLON SETINT DISABLE ENABLE CLRINT FPO FENDNORM "
     b"SPCON SPCOF WRITE DELETE STRINGIS PROTD IPTRLOCK IPTRUNLOCK STOPRE CTOL FCTDEF "
     b"RELEASE GET GETD AXTOCHAN CYCLE_HSC EXTERN MMC COUPDEF TANGDEF".split()
@@ -56,7 +59,7 @@ QUIET_CALLS = frozenset(
 OPENS = frozenset(b"FOR WHILE LOOP IF".split())
 CLOSES = frozenset(b"ENDFOR ENDWHILE ENDLOOP ENDIF UNTIL".split())
 JUMPS = frozenset(b"GOTO GOTOF GOTOB GOTOC GOTOS REPEAT REPEATB CASE CALL PCALL EXTCALL CALLPATH".split())
-DECLARES = frozenset(b"DEF EXTERN REDEF PROC ID IDS WHEN WHENEVER FROM EVERY DEFINE STRING".split())
+DECLARES = frozenset(b"DEF EXTERN REDEF PROC ID IDS DO WHEN WHENEVER FROM EVERY DEFINE STRING".split())
 SUPERIMPOSED = re.compile(rb"\$AA_T?OFF|\b(?:POS|MOV)\[")
 """What a synchronous action does to axes while the program's own motions run."""
 QUIET_NAMES = frozenset(b"ELSE DEFAULT SAVE DISPLOF DISPLON SBLOF SBLON ACTBLOCNO ENDLABEL PREPRO".split())
@@ -223,7 +226,7 @@ class _Taken:
                 self.codes(place, close, b"TOFRAME")
             return close
         if name in self.names:
-            closed = self.arguments(end)
+            closed = self.arguments(stop)
             if name != b"GEOAX" or text[end:closed].strip(
                 b"() \t"
             ):  # without axes: those of the machine again
@@ -245,8 +248,13 @@ class _Taken:
         if name in ACTIONS:
             # It acts before the motion, as S and M do.
             self.word(place, key("S"), -1, end, math.nan, How.UNREAD)
-        elif name in LENGTHS:
-            self.word(place, key("D"), -1, end, math.nan, How.UNREAD)
+        elif name in SWITCHES:
+            off = constant(self.text[behind:end]) == (100 if name == b"OVR" else 0)
+            self.codes(place, end, SWITCHES[name] + (b"(OFF)" if off else b"(ON)"))
+        elif name == b"FB":
+            self.note("feed", name)
+        elif name in (b"ID", b"IDS"):
+            return self.statement(name, place, behind)
         elif name in CORNERS or name in POLAR:
             self.note("corner" if name in CORNERS else "polar", name)
         elif name in SETTINGS:
@@ -312,8 +320,14 @@ class _Taken:
                 self.note("between" if name == b"ELSE" else "assign", said)
                 if SUPERIMPOSED.search(said):
                     self.codes(place, len(text), b"TOFRAME")
+                if b"$AC_OVR" in said or b"$AC_VC" in said:
+                    self.codes(place, len(text), b"OVR(ON)")
             return len(text)
         closed = self.arguments(end)
+        if name == b"FGROUP":
+            grouped = text[end:closed].upper().translate(None, b" \t")
+            self.codes(place, closed, b"FGROUP(XYZ)" if grouped in (b"()", b"(X,Y,Z)") else b"FGROUP(OTHER)")
+            return closed
         if name in QUIET_CALLS:
             return closed
         if name in DRILLING | MILLING and not self.words and not text[closed:].strip():

@@ -18,9 +18,9 @@ from postproc.languages.krl.lexing import (
     number,
     value_end,
 )
-from postproc.languages.krl.modal_state import NAN, ZERO, FrameIndex, Record
+from postproc.languages.krl.modal_state import NAN, OVERRIDES, ZERO, FrameIndex, Record
 from postproc.languages.krl.motion_rows import RowRefusal
-from postproc.languages.krl.statement_effects import MODAL, READS_POSITION, bas
+from postproc.languages.krl.statement_effects import BAS_COMMANDS, MODAL, READS_POSITION, bas
 from postproc.languages.krl.target import (
     AXES,
     COMPONENTS,
@@ -66,6 +66,8 @@ def assign(run: ExecutionContext, statement: Statement, said: Assignment, here: 
     elif name == b"$APO":
         if said.path in (b"", b"CDIS"):
             _set_rounding(run, said)
+    elif name in OVERRIDES:
+        state.overridden = state.overridden - {name} | ({name} if run.value(said.value) != 100 else set())
     elif name == b"$IPO_MODE":
         mode = said.value.strip().upper()
         if found := _MODE.match(mode):
@@ -132,7 +134,7 @@ def command(run: ExecutionContext, statement: Statement, arguments: bytes) -> No
     """Takes up a call of BAS."""
     state = run.state
     parsed = bas(arguments)
-    if parsed is None:
+    if parsed is None or parsed[0] not in BAS_COMMANDS:
         run.forget(MODAL, f"after the call of BAS in line {statement.line}")
         return
     word, argument = parsed

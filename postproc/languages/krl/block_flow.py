@@ -9,7 +9,7 @@ from postproc.languages.krl.assignments import with_clause
 from postproc.languages.krl.execution_context import Flow, SplineBlock
 from postproc.languages.krl.expressions import Value
 from postproc.languages.krl.flow_frames import BlockFrame
-from postproc.languages.krl.lexing import NAME, SPLINES, Statement, identifiers, kept, value_end
+from postproc.languages.krl.lexing import NAME, SPLINES, Statement, identifiers, is_integer, kept, value_end
 from postproc.languages.krl.modal_state import ELSEWHERE
 from postproc.languages.krl.open_blocks import BUDGET, OpenBlocks
 from postproc.languages.krl.program_blocks import Block
@@ -255,8 +255,11 @@ class BlockFlow(OpenBlocks):
             self._pop()
             self._continue_with(frame.exits)
         elif frame.counter is not None:
-            name, value, last, step = frame.counter
-            value += step
+            name, _, last, step = frame.counter
+            reached = run.value(name)  # its own statements may have set it
+            if not is_integer(reached):
+                return self._abort(frame)
+            value = reached + step
             run.variables.set(name, b"", value)
             if (last - value) * step >= 0:
                 frame.counter = (name, value, last, step)

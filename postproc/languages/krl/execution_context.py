@@ -101,6 +101,8 @@ class ExecutionContext:
             self.state.later_since = self.state.later_since or line
             self.later_since = self.later_since or line
         self.later_speed |= effects & {"feed", "apo"}
+        if "override" in effects:
+            self.later_speed |= {"feed"}
         self.state.later_speed |= self.later_speed
         if "point" in effects:
             self.moved_later = self.moved_later or line

@@ -84,6 +84,7 @@ class Anchor:
 
 PointFrames = tuple["FrameIndex | UnknownValue", "FrameIndex | UnknownValue"]
 
+OVERRIDES = frozenset([b"$OV_PRO", b"$OV_ROB"])
 NO_BASE = UnknownValue("KRL005", "no $BASE is set before it")
 NO_TOOL = UnknownValue("KRL005", "no $TOOL is set before it")
 
@@ -110,7 +111,7 @@ class ModalState:
     the world; later_since: the line, if any, from which on an interrupt or a trigger may change base or tool;
     later_speed: which of "feed" and "apo" one may change; moved_later, ended_later: the line, if any, from which on one
     may move the robot, or end what a call runs (RESUME); stop: whether the advance run stops before the next motion,
-    no_advance: before every one: 2 where it does, 1 where it may.
+    no_advance: before every one: 2 where it does, 1 where it may; overridden: speed overrides that may not be 100 %.
     """
 
     base: FrameIndex | UnknownValue = NO_BASE
@@ -141,11 +142,12 @@ class ModalState:
     no_advance: int = 0
     moved_later: int = 0
     ended_later: int = 0
+    overridden: frozenset[bytes] = frozenset()
 
     @property
     def steady_feed(self) -> float:
-        """[m/s] the feed that no interrupt or trigger changes; NaN where one may, or where it is not known."""
-        return NAN if "feed" in self.later_speed else self.feed
+        """[m/s] the feed that no interrupt, trigger or override changes; NaN where one may, or is not known."""
+        return NAN if self.overridden or "feed" in self.later_speed else self.feed
 
     @property
     def steady_blend(self) -> float:
@@ -188,6 +190,8 @@ class ModalState:
             self.tool_known = True
         if "turning" in words and has_turning:
             self.orientation, self.arc_frame = OrientationMode.UNKNOWN, ArcFrame.UNKNOWN
+        if "override" in words:
+            self.overridden = OVERRIDES
         if "record" in words:
             self.frames_record = self.path_record = self.axis_record = None
 
@@ -292,6 +296,7 @@ _JOINS: dict[str, Callable[[Any, Any], object]] = {
     "root_set": _either,
     "later_since": _either,
     "later_speed": frozenset.union,
+    "overridden": frozenset.union,
     "stop": lambda one, other: 1,
     "no_advance": lambda one, other: 1,
     "moved_later": _either,

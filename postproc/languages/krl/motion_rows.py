@@ -71,7 +71,8 @@ class MotionRows:
 
     ``passing``: points of spline blocks; ``entries``: first point of such a block -> line of its header.
     ``arc_blends``: exact arcs -> $APO.CDIS [mm] there.  ``sources_of``: rows that may start elsewhere than where the
-    row before ends -> where.  ``stopped``: rows before which the advance run stops (2) or may (1).
+    row before ends -> where.  ``stopped``: rows before which the advance run stops (2) or may (1);
+    ``stopped_at_end``: sources of ends of the program before which it does.
     ``calls``: the count of rows, and after which ones a routine of another module moves the robot.
     ``left_from``: where routines end after which it is not known what runs.
     ``never_from``: the first row of those that never run.
@@ -90,6 +91,7 @@ class MotionRows:
     whole: dict[int, str] = field(default_factory=dict)
     sources_of: dict[int, frozenset[Source]] = field(default_factory=dict)
     stopped: dict[int, int] = field(default_factory=dict)
+    stopped_at_end: list[tuple[frozenset[Source], int]] = field(default_factory=list)
     calls: list[tuple[int, frozenset[Source]]] = field(default_factory=list)
     left_from: set[Source] = field(default_factory=set)
     never_from: int | None = None

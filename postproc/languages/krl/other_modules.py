@@ -44,7 +44,7 @@ _MOTION = Statement("motion", b"", b"", 0, 0)
 
 MODAL_FIELDS = (
     "base", "tool", "feed", "blend", "tool_known", "orientation", "arc_frame", "frames_record", "path_record",
-    "axis_record", "no_advance",
+    "axis_record", "no_advance", "overridden",
 )  # fmt: skip
 """What a called routine leaves to its caller, besides variables and the position."""
 POSITION_FIELDS = (

@@ -25,6 +25,7 @@ from postproc.languages.krl.lexing import (
 )
 from postproc.languages.krl.modal_state import (
     ELSEWHERE,
+    NAN,
     TRIGGERED,
     FrameRegister,
     InlineFormState,
@@ -248,6 +249,8 @@ class ProgramFlow(Calls):
             return self._leave(pc, kind)
         elif kind == "other" and item.word in (b"ASYPTP", b"ASYCONT"):
             run.state.external = by_themselves(run.state.external, item.code)
+        elif item.word == b"TIME_BLOCK" and run.spline is not None:
+            run.state.feed = NAN  # the block takes a time
         elif kind == "other" and run.survey.has_routine and HIDDEN.search(item.code):
             motions.unknown_motion(run, item)
         elif item.word in (b"TRIGGER", b"INTERRUPT", b"GLOBAL"):

@@ -97,11 +97,16 @@ _BAS_EFFECTS: dict[bytes, Effects] = {
     b"PTP_DAT": {"apo"},
     b"CP_DAT": {"feed", "apo", "turning"},
     b"VEL_CP": {"feed"},
+    **{key: set() for key in b"ACC_CP ACC_PTP VEL_PTP ACC_GLUE OUT_SYNC OUT_ASYNC GROUP".split()},
 }
+"""The commands of KUKA's bas.src, and what they set; another one may set all of it."""
+BAS_COMMANDS = frozenset(_BAS_EFFECTS)
 SYSTEM: dict[bytes, str] = {
     b"$BASE": "base",
     b"$TOOL": "tool",
     b"$VEL": "feed",
+    b"$OV_PRO": "override",
+    b"$OV_ROB": "override",
     b"$APO": "apo",
     b"$IPO_MODE": "mode",
     b"$ORI_TYPE": "turning",
@@ -123,7 +128,7 @@ def bas(arguments: bytes) -> tuple[bytes, bytes] | None:
 
 def effects_of_bas(arguments: bytes) -> Effects:
     command = bas(arguments)
-    return set(_BAS_EFFECTS.get(command[0], set()) if command else MODAL)
+    return set(_BAS_EFFECTS.get(command[0], MODAL) if command else MODAL)
 
 
 def is_harmless(name: bytes) -> bool:
