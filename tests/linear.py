@@ -16,6 +16,20 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from linear_robots import (
+    RAPID,
+    RAPID_AROUND,
+    RAPID_BODIES,
+    RAPID_HEAD,
+    RAPID_LINES,
+    RAPID_TAIL,
+    TP,
+    TP_AROUND,
+    TP_HEAD,
+    TP_LINES,
+    TP_TAIL,
+)
+
 from postproc.base.findings import Refusal
 
 MB = 1_000_000
@@ -88,40 +102,6 @@ BODIES = (
     "SPL {X %d}\n", "G()\n",
 )  # fmt: skip
 KRL_HEAD = "DEF part()\n$BASE=BASE_DATA[1]\n$TOOL=TOOL_DATA[1]\n"
-
-RAPID = {
-    "bare": ("", ""), "name": ("a", ";"), "label": ("a", ":"), "number": ("n:=1", ";"), "string": ('TPWrite "', '";'),
-    "target": ("MoveL [[1", ",2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,tool0;"),
-    "aggregate": ("MoveL [", "],v1,z1,tool0;"), "tail": ("MoveL p,v1,z1,", ";"), "index": ("a{", "}:=1;"),
-    "component": ("a.", ":=1;"), "assignment": ("n:=", ";"), "call": ("f ", ";"), "option": ("f \\", ";"),
-    "IF": ("IF ", " THEN"), "FOR": ("FOR i FROM ", " DO"), "comment": ("!", ""), "FORCE": ("! FORCE ", ""),
-    "declaration": ("VAR num ", ";"), "PROC": ("ENDPROC\nPROC ", "()"), "header": ("%%%", "%%%"),
-}  # fmt: skip
-RAPID_LINE = "MoveL [[%d,0,0],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,z1,t;\n"
-RAPID_LINES = (
-    RAPID_LINE, RAPID_LINE.replace("0,0,1,0", "0,0,1E99,0"), RAPID_LINE.replace("%d", "1" * 320), "MoveL *,v1,z1,t;\n",
-    7 * RAPID_LINE.replace("%d", "1") + ";\n", RAPID_LINE.replace("%d", "1"), RAPID_LINE[:-2], "MoveL p%d,v1,z1,t;\n",
-    "MoveC p,p%d,v1,z1,t;\n", "MoveAbsJ j%d,v1,z1,t;\n", "VAR num n%d;\n", "n:=n+%d;\n", "n:=(\n", "a%d:\n",
-    "GOTO a%d;\n",
-    "IF n=%d THEN\n", "IF n=%d THEN\nENDIF\n", "FOR i FROM 1 TO %d DO\n", "FOR i FROM 1 TO 3 DO\nENDFOR\n",
-    "FOR i FROM 1 TO 9 DO\nFOR k FROM 1 TO 9 DO\nENDFOR\nENDFOR\n", "WHILE n<%d DO\n", "WHILE n<9 DO\nENDWHILE\n",
-    "WHILE di1=%d DO\nENDWHILE\n", "WHILE di1=1 DO\nWHILE di1=1 DO\nn:=%d;\nENDWHILE\nENDWHILE\n", "TEST n\nCASE %d:\n",
-    "f%d;\n", "ENDPROC\nPROC f%d()\n", "ENDPROC\nPROC f%d()\nmain;\n", "! FORCE %d 2 3\n", "! a\n", "\n", "\r", ";",
-    "ConfL\\Off;\n", "PDispOff;\n", "p:=Offs(p,0,0,%d);\n", "p%d:=p;\n", "RETURN;\n", "ERROR\n", "EXIT;\n",
-)  # fmt: skip
-RAPID_AROUND = {
-    "FOR": ("FOR i FROM 1 TO 1000 DO", "ENDFOR"), "WHILE": ("n:=0;\nWHILE n<9 DO\nn:=n+1;", "ENDWHILE"),
-    "WHILE in FOR": ("FOR i FROM 1 TO 99 DO\nWHILE di1=1 DO", "ENDWHILE\nENDFOR"),
-    "FOR in WHILE": ("WHILE di1=1 DO\nFOR i FROM 1 TO 99 DO", "ENDFOR\nENDWHILE"),
-    "WHILE thrice": (3 * "WHILE di1=1 DO\n", 3 * "ENDWHILE\n"), "IF": ("IF di1=1 THEN", "ENDIF"),
-    "GOTO": ("a:", "GOTO a;"), "calls": ("f;\nf;\nf;\nENDPROC\nPROC f()", ""),
-}  # fmt: skip
-RAPID_BODIES = (
-    RAPID_LINE, "MoveL Offs(p,0,0,n),v1,z1,t;\n", "n:=n+1;\n", "! a\n", "IF n=%d THEN\nENDIF\n", "p%d:=p;\n",
-    "FOR k FROM 1 TO 9 DO\nMoveL p,v1,z1,t;\nENDFOR\n", "g;\n", "! FORCE 1 2 3\n",
-)  # fmt: skip
-RAPID_HEAD = "MODULE m\nVAR num n;\nVAR robtarget p;\nPROC main()\n"
-RAPID_TAIL = "\nENDPROC\nENDMODULE\n"
 
 GCODE = {
     "bare": ("", ""), "X": ("X", "!"), "O": ("O", "!"), "N": ("N", "!"), "G1 X": ("G1 X1", "!"),
@@ -268,6 +248,12 @@ def all_cases() -> list[Case]:
         for name, (start, end) in RAPID_AROUND.items()
         for body in RAPID_BODIES
     ]
+    found += _cases("ls", TP_HEAD, TP, TP_LINES, "\n", TP_TAIL)
+    found += [
+        Case("ls", f"{name} around {body!r}", f"{TP_HEAD}{start}\n", body, end + TP_TAIL)
+        for name, (start, end) in TP_AROUND.items()
+        for body in TP_LINES
+    ]
     for control, head in CONTROLS.items():
         found += _cases(control, head, GCODE, GCODE_LINES, "\n")
         found += [
@@ -344,7 +330,7 @@ def _urdf(folder: Path, text: bytes) -> None:
 
 _READERS: dict[str, Callable[[Path, bytes], None]] = {
     "src": _program("part.src"), "first.src": _program("part.src"), "dat": _program("part.dat"),
-    "mod": _program("part.mod"),
+    "mod": _program("part.mod"), "ls": _program("part.ls"),
     "linuxcnc": _program("part.ngc"), "fanuc": _program("part.nc"), "sinumerik": _program("part.mpf"),
     "kuka_cnc": _program("part.nc"), "first.ngc": _program("part.ngc"), "robot": _yaml("robot"),
     "cell": _yaml("cell"),
