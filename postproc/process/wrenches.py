@@ -115,21 +115,42 @@ class Wrenches:
         values[rows] += self.ramps.at(rows, np.ones(len(rows)))
         return frozen(values)
 
+    def largest_along(self, rows: Ints) -> Floats:
+        """(K, 6) the wrench of the motions ``rows`` (K,) where their profile has its largest force; at the end of those
+        without one."""
+        wrench = self.at_end[rows].copy()
+        if self.ramps is None or not self.ramps.inside.any():
+            return wrench
+        at, share, _ = self.ramps.only(self.ramps.inside).places()
+        there = self.along(at, share)
+        order = np.lexsort((lengths(there[:, :3]), at))
+        last = np.append(at[order][1:] != at[order][:-1], True)
+        motion, largest = at[order][last], there[order][last]
+        place = np.minimum(np.searchsorted(motion, rows), len(motion) - 1)
+        own = motion[place] == rows
+        wrench[own] = largest[place[own]]
+        return wrench
+
     @cached_property
     def inner_steps(self) -> Ints:
         """Motions (K,) with which the wrench steps inside a cut."""
         before = np.append(False, self.carries[:-1])
         return np.flatnonzero(self.steps & before)
 
-    def ramped(self, rows: Ints, length: Floats, extent: Floats) -> Wrenches:
+    def ramped(self, rows: Ints, length: Floats, extent: Floats, early: Floats) -> Wrenches:
         """The same, where the steps at the start of the motions ``rows`` (K,) go over along ``length`` (K,) [m] of the
-        path; extent (N,) [m]: lengths of the motions."""
+        path, the shares ``early`` (K,) of them before it; extent (N,) [m]: lengths of the motions."""
         if not len(rows):
             return self
         step = self.start[rows] - self.values[rows - 1]
-        steps = self.steps.copy()
+        steps, carries = self.steps.copy(), np.asarray(self.carries)
         steps[rows] = False
-        ramps = Ramps.of(rows, step, length, extent, np.asarray(self.carries))
+        late, lead = np.flatnonzero(early < 1.0), np.flatnonzero(early > 0.0)
+        after = (1.0 - early[late])[:, None] * step[late]
+        ramps = Ramps.of(rows[late], after, length[late], extent, carries)
+        if len(lead):
+            ahead = early[lead, None] * step[lead]
+            ramps = ramps.joined(Ramps.leading(rows[lead], ahead, length[lead], extent, carries))
         return replace(self, steps=steps, ramps=ramps if self.ramps is None else self.ramps.joined(ramps))
 
     def along(self, rows: Ints, fraction: Floats) -> Floats:
