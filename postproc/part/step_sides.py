@@ -23,14 +23,13 @@ from postproc.process.stock.simulation import StockRun
 _ANGLES, _ALONG = 32, 24
 _HIGHEST = 60 * MM  # of edges that are looked at
 _LEAST = 1e-6  # m: less is no gouge
-_WHOLE = 0.1  # shares nearer to nothing, or to all, are that
 
 
 def find_early_shares(task: CompensationProblem, run: StockRun, rows: Ints, change: Floats) -> Floats:
-    """(K,) the shares of the steps ``change`` (K, 3) [m] of the correction, path axes, at the start of motions ``rows``
-    (K,), that are to go over before it, so that the deeper of both gouges is the least.
+    """(K,) of the steps ``change`` (K, 3) [m] of the correction, path axes, at the start of motions ``rows`` (K,), 1
+    where the tool digs less into the part if they go over before it, else 0.
 
-    A gouge grows with its share of the step: with those of the whole step, e before and l after, l / (e + l).
+    Whole: two ramps for a step have their ends nearer to other points than the controller follows.
     """
     sweeps = run.sweeps
     to_stock = Displacements(task, sweeps.in_stock).to_stock(rows)
@@ -46,9 +45,7 @@ def find_early_shares(task: CompensationProblem, run: StockRun, rows: Ints, chan
         side /= np.linalg.norm(side)
         surface = tip + surfaces[sweeps.which[at]] @ np.stack([side, np.cross(axis, side), axis])
         early, late = (_deepest(run.engagement.stock, surface + sign * change[k]) for sign in (1.0, -1.0))
-        if late > _LEAST:
-            shares[k] = late / (early + late)
-    shares[shares < _WHOLE], shares[shares > 1.0 - _WHOLE] = 0.0, 1.0
+        shares[k] = float(late > early + _LEAST)
     return shares
 
 
