@@ -324,6 +324,7 @@ class Machine:
         self.floor = np.zeros((482, 322))
         self.field = np.zeros((2402, 400))
         self.places, self.largest, self.worst = [], 0.0, 0.0
+        self.tip, self.place = np.full(3, np.nan), np.full(3, np.nan)
 
     def run(self, text):
         chain, before = [], None
@@ -365,10 +366,16 @@ class Machine:
             base, slope = (
                 (1 - s) * one + s * other for one, other in zip(lines[node], lines[node + 1], strict=True)
             )
-            feed = points[min(index + 1, len(points) - 1)] - points[max(index - 1, 0)]
-            feed = feed / np.linalg.norm(feed)
             fresh = index == 0 and chain and chain[-1][0] == move.tool
-            wrench, moved = self._settle(move.tool, points[index], feed, base, slope, wrench, chip, chain)
+            if fresh and np.linalg.norm(points[0] - self.tip) < 0.01:
+                continue  # where the tool is already
+            feed = points[min(index + 1, len(points) - 1)] - points[max(index - 1, 0)]
+            came = (points[index] - self.tip, self.place) if chain and chain[-1][0] == move.tool else None
+            feed = feed / np.linalg.norm(feed)
+            wrench, moved = self._settle(
+                move.tool, points[index], feed, base, slope, wrench, chip, chain, came
+            )
+            self.tip, self.place = points[index], points[index] + moved[:3]
             place = (points[index] + moved[:3], np.array([0, 0, 1.0]) + np.cross(moved[3:], [0, 0, 1.0]))
             self.places.append((move.line, *place, *wrench))
             if move.tool == 2 and chain and chain[-1][0] == 2:
@@ -377,8 +384,12 @@ class Machine:
                 chain.append((move.tool, *place))
         return wrench
 
-    def _settle(self, tool, tip, feed, base, slope, wrench, chip, chain):
-        """The wrench and the displacement (6,) that belong to each other."""
+    def _settle(self, tool, tip, feed, base, slope, wrench, chip, chain, came=None):
+        """The wrench and the displacement (6,) that belong to each other.
+
+        came: step of the command to ``tip`` and the place that the tool comes from.  It cuts in the direction in which
+        it moves itself, and with the chip of its own speed: where the path turns, it yields, and follows only then.
+        """
         radius, teeth = self.tools[tool]
         recent = [chain[-k] for k in RECENT if k <= len(chain)]
         recent = np.array([np.concatenate(one[1:]) for one in recent]).reshape(-1, 6)
@@ -387,10 +398,15 @@ class Machine:
             moved = base + slope @ wrench
             at, axis = tip + moved[:3], np.array([0, 0, 1.0]) + np.cross(moved[3:], [0, 0, 1.0])
             axis = axis / np.linalg.norm(axis)
+            own, thick = feed, chip
+            if came is not None:
+                own = at - came[1]
+                far = max(np.linalg.norm(own), 1e-9)
+                own, thick = own / far, chip * far / np.linalg.norm(came[0])
             if tool == 1:
-                flat_force(self.wall, self.floor, recent, at, axis, feed, radius, chip, teeth, met)
+                flat_force(self.wall, self.floor, recent, at, axis, own, radius, thick, teeth, met)
             else:
-                ball_force(self.field, at, axis, feed, radius, chip, teeth, met)
+                ball_force(self.field, at, axis, own, radius, thick, teeth, met)
             rest = met - wrench
             size = np.linalg.norm((slope @ rest)[:3])
             if size < SETTLED:

@@ -106,8 +106,8 @@ def test_the_factors_of_a_cell_act_on_profiles_and_ramps_too():
     forces = Wrenches(values, values, carries, "test", (), np.zeros(n, bool))
     forces = replace(forces, ramps=Ramps.profile(motion, share, rest, extent))
     forces = forces.ramped(
-        np.array([3, 11]), np.array([0.03, 0.25]), extent
-    )  # one goes over motions that follow
+        np.array([3, 11]), np.array([0.03, 0.25]), extent, np.array([0.0, 0.4])
+    )  # one goes over motions beside it
     names = OperationNames(("TOOL 1",), np.zeros(n, int))
     base = np.tile(np.eye(3), (n, 1, 1))
     rows, at = np.repeat(np.arange(n), 7), np.tile(np.linspace(0, 1, 7), n)

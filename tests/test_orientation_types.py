@@ -25,7 +25,7 @@ from postproc.compensation.path_error import PathSegments
 from postproc.languages.krl import KrlDialect
 from postproc.model import StiffnessModel
 from postproc.process import wrenches
-from postproc.process.wrenches import Turning
+from postproc.process.force_turning import Turning
 from postproc.robot.axis_track import follow_axes, nominal_flange
 from postproc.robot.inverse import inverse
 from postproc.robot.orientation_modes import as_run

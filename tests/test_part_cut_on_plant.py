@@ -57,7 +57,10 @@ def compare(machine, part, side):
 
 @pytest.mark.slow
 def test_the_part_as_posted_is_the_one_that_the_machine_cuts(reported):
-    """Engagement and deflection of 2.4 mm: the wall within 1 %, the floor 1 um, the wave 4 um but at its rims."""
+    """Engagement and deflection of 2.4 mm: the wall within 1 %, the floor and the wave 4 um but at rims.
+
+    The machine cuts with the chip of the tool's own speed, the report with that of the feed: they differ where the tool
+    enters and leaves, and its displacement changes along the feed."""
     program, task, part = reported
     machine = cut(task, program)
     assert machine.largest == pytest.approx(part.figures.as_posted.force, rel=0.01)
@@ -67,7 +70,7 @@ def test_the_part_as_posted_is_the_one_that_the_machine_cuts(reported):
     assert np.percentile(np.abs(error - true), 90) < 0.01 * np.abs(true).max()
     error, true = found["floor"]
     assert np.abs(true).max() > 0.09
-    assert np.percentile(np.abs(error - true), 95) < 1e-3
+    assert np.percentile(np.abs(error - true), [75, 95]) == pytest.approx([0, 0], abs=5e-3)
     error, true = found["wave"]
     assert np.abs(true).max() > 0.3
     assert np.percentile(np.abs(error - true), [50, 90]) == pytest.approx([0, 0], abs=4e-3)
@@ -75,18 +78,21 @@ def test_the_part_as_posted_is_the_one_that_the_machine_cuts(reported):
 
 @pytest.mark.slow
 def test_the_part_as_written_is_the_one_that_the_machine_cuts(reported):
-    """Within some um, but at the rims of the wave; what is left where the force steps at the ends of its rows too."""
+    """Within some um, but at the rims of the wave; where the force steps at the ends of its rows the tool digs in by a
+    quarter of what it would if the correction followed the step (0.43 mm), and leaves more than is reported."""
     program, task, part = reported
     machine = cut(task, program.parent / "compensated/part.ngc")
+    assert machine.worst < 0.1
     found = compare(machine, part, part.after)
-    for name, most in (("wall", 5e-3), ("floor", 2e-3), ("wave", 7e-3)):
+    for name, most in (("wall", 4e-3), ("floor", 2e-3), ("wave", 4e-3)):
         error, true = found[name]
         assert np.percentile(np.abs(error - true), 90) < most, name
         assert np.median(np.abs(error - true)) < 3e-3, name
     # where the tool enters and leaves the correction follows
     for name in ("wall", "floor"):
-        assert np.abs(found[name][1]).max() < 0.06, name
-    # the rows of the wave end in the stock, where the path turns at once: there it takes a motion to follow
+        assert np.abs(found[name][1]).max() < 0.03, name
     error, true = found["wave"]
-    assert true.min() < -0.3
-    assert error.min() == pytest.approx(true.min(), rel=0.1)
+    assert true.min() > -0.11
+    assert true.max() < 0.16
+    assert error.min() > -0.14
+    assert np.percentile(np.abs(error - true), 99) < 0.07

@@ -43,6 +43,34 @@ def test_a_ramp_adds_what_is_left_of_its_step(seed):
         np.testing.assert_allclose(added, expected, atol=1e-12)
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_a_share_of_a_step_goes_over_before_it(seed):
+    """Walked by hand: back from the step, no further than to the start of its cut; and after it the rest."""
+    rows, _, length, extent, carries, rng = some_ramps(seed)
+    extent = np.maximum(extent, 0.1)
+    values = rng.normal(size=(len(extent), 6)) * carries[:, None]
+    early = rng.choice([0.0, 0.3, 1.0], len(rows))
+    steps = np.zeros(len(extent), bool)
+    steps[rows] = True
+    force = Wrenches(values, values, carries, "test", (), steps)
+    ramped = force.ramped(rows, length, extent, early)
+    motions, share = rng.integers(1, len(extent), 200), rng.random(200)
+    expected = np.zeros((200, 6))
+    for k, (motion, t) in enumerate(zip(motions, share, strict=True)):
+        for row, long, part in zip(rows, length, early, strict=True):
+            change = values[row] - values[row - 1]
+            if row > motion and carries[motion:row].all():
+                walked = (1 - t) * extent[motion] + extent[motion + 1 : row].sum()
+                expected[k] += max(1 - walked / long, 0) * part * change
+            elif row <= motion and carries[row : motion + 1].all():
+                walked = extent[row:motion].sum() + t * extent[motion]
+                expected[k] -= max(1 - walked / long, 0) * (1 - part) * change
+    np.testing.assert_allclose(ramped.ramps.at(motions, share), expected, atol=1e-12)
+    found, _, shares = ramped.ramps.steps()
+    np.testing.assert_array_equal(found, rows)
+    np.testing.assert_allclose(shares, early, atol=1e-12)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_ramp_ends_inside_of_the_motion_that_it_is_said_to_end_in(seed):
     rows, step, length, extent, carries, _ = some_ramps(seed)
@@ -114,7 +142,7 @@ def test_a_ramp_of_many_motions_reaches_their_end_points():
     values[1:3, 0], values[3:, 0] = 100.0, 300.0
     steps = np.array([False, True, False, True, False, False])
     force = Wrenches(values, values, values.any(axis=1), "test", (), steps)
-    ramped = force.ramped(np.array([3]), np.array([2.5]), np.ones(n))
+    ramped = force.ramped(np.array([3]), np.array([2.5]), np.ones(n), np.zeros(1))
     np.testing.assert_allclose(ramped.at_end[:, 0], [0, 100, 100, 180, 260, 300])
     np.testing.assert_array_equal(ramped.steps, [False, True, False, False, False, False])
-    assert force.ramped(np.empty(0, int), np.empty(0), np.ones(n)) is force
+    assert force.ramped(np.empty(0, int), np.empty(0), np.ones(n), np.empty(0)) is force

@@ -117,7 +117,7 @@ def _knots(motions: DivisibleMotions) -> tuple[Ints, Floats]:
         motions.free[row]
         & np.isin(row, motions.rows[~motions.spline])
         & (share >= spacing)
-        & (share <= 1.0 - spacing)
+        & (share <= 1.0 - spacing + 1e-12)
     )
     row, share, spacing = row[good], share[good], spacing[good]
     while len(row):  # of those too near to each other the first stays

@@ -128,6 +128,14 @@ def errors_between_as_programmed(task: CompensationProblem, rows: Ints) -> Float
     return np.concatenate([np.empty(0), *in_blocks(compare, len(rows))])
 
 
+def errors_inside(task: CompensationProblem) -> tuple[Ints, Floats]:
+    """The motions (K,) inside of which the force changes, and the largest error (K,) [m] across the feed along each as
+    it is programmed."""
+    ramps = task.force.ramps
+    rows = np.unique(ramps.row[ramps.inside]) if ramps is not None else np.empty(0, np.int64)
+    return rows, errors_between_as_programmed(task, rows)
+
+
 @dataclass(frozen=True)
 class Transitions:
     """What an output does where its correction changes.

@@ -129,7 +129,7 @@ def _ramps(
     row, many = np.unique(parts.row, return_counts=True)
     at = np.searchsorted(parts.row, row)
     end = parts.length[at]
-    good = (many == 1) & (parts.start[at] <= 0.0) & (end < parts.extent[at])
+    good = (many == 1) & (parts.start[at] <= 0.0) & (end < parts.extent[at]) & ~parts.before[at]
     row, end = row[good], end[good]
     before = row - 1
     on = (

@@ -11,6 +11,7 @@ stiffness changes between the two, and a ramp of k = 0.9 that is 0.016 mm longer
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -33,9 +34,16 @@ STEEPEST = 0.9
 """By how much a correction may go back along the feed on a ramp, m per m of path: no motion on it leads backwards."""
 
 
-def add_force_ramps(task: CompensationProblem, ramp: Floats | float) -> CompensationProblem:
+EarlyShares = Callable[[Ints, Floats], Floats]
+"""Of motions (K,) at whose start the correction steps by (K, 3) [m]: the shares (K,) of it that go over before."""
+
+
+def add_force_ramps(
+    task: CompensationProblem, ramp: Floats | float, early: EarlyShares | None = None
+) -> CompensationProblem:
     """The task, in which no force steps inside a cut: each step that is not measured goes over along ``ramp`` (N,) [m]
-    of the path after it, or along as much more as a correction needs that goes back along the feed (``STEEPEST``)."""
+    of the path after it, or along as much more as a correction needs that goes back along the feed (``STEEPEST``);
+    the shares ``early`` of it along as much of the path before."""
     if task.force.measured:
         return task
     task = _limit_profiles(task)
@@ -47,12 +55,24 @@ def add_force_ramps(task: CompensationProblem, ramp: Floats | float) -> Compensa
     rows = rows[known & (away > SAME * max(1.0, task.force.max_force))]
     if not len(rows):
         return task
-    tangent = task.desired_path.tangent(rows, np.zeros(len(rows)))
-    back = -np.nan_to_num(np.sum(correction_steps(task, rows) * tangent, axis=1))
+    change = np.nan_to_num(correction_steps(task, rows))
+    sooner = np.zeros(len(rows)) if early is None else early(rows, change)
+    tangents = (
+        task.desired_path.tangent(rows, np.zeros(len(rows))),
+        task.desired_path.tangent(rows - 1, np.ones(len(rows))),
+    )
+    back = -np.minimum(
+        *(
+            share * np.nan_to_num(np.sum(change * tangent, axis=1))
+            for share, tangent in zip((1.0 - sooner, sooner), tangents, strict=True)
+        )
+    )
     asked = np.broadcast_to(ramp, (len(task.toolpath),))[rows]
     length = np.maximum(np.maximum(asked, SHORTEST), back / STEEPEST)
     desired_path = task.desired_path
-    task = replace(task, force=task.force.ramped(rows, length, desired_path.length), ramp=float(asked.min()))
+    task = replace(
+        task, force=task.force.ramped(rows, length, desired_path.length, sooner), ramp=float(asked.min())
+    )
     vars(task)["desired_path"] = desired_path  # forces change no path
     return task
 

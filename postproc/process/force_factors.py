@@ -61,8 +61,8 @@ class ForceFactors:
             rest = act(replace(forces, ramps=profiles).along(at, share), at) - acting.along(at, share)
             rest[(share == 0.0) | (share == 1.0)] = 0.0
             acting = replace(acting, ramps=Ramps.profile(at, share, rest, extent))
-        starts = steps.start == 0.0
-        return acting.ramped(steps.row[starts], steps.length[starts], extent)
+        stepping, length, early = steps.steps()
+        return acting.ramped(stepping, length, extent, early)
 
 
 def axes_across(force: Floats, axes: Floats) -> tuple[Floats, Floats]:

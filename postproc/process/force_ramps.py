@@ -7,12 +7,12 @@ at the vertex where a motion starts acts, at the path length s after that vertex
 
 so that the motion before keeps its own force up to the vertex, and the new one is whole at s = r.  Steps that lie
 nearer to each other than r add up.  Where the force changes inside of a motion, as at entries and exits, parts of the
-same form add up to its profile.
+same form add up to its profile.  A share of the step may go over before its vertex, along the motions that lead to it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -24,8 +24,9 @@ class Ramps:
     """E parts of ramps, one for each motion that a ramp leads over, ascending by motion.
 
     row (E,): the motion; start (E,) [m]: path length from the step to where the motion starts; extent (E,) [m]: length
-    of the motion; length (E,) [m]: of the whole ramp, > 0; step (E, 6) [N, N m]: new minus old wrench, robot base axes;
-    inside (E,): part of the profile of its motion, no step.
+    of the motion; length (E,) [m]: of the whole ramp, > 0; step (E, 6) [N, N m]: new minus old wrench, robot base axes,
+    of ``before`` old minus new; inside (E,): part of the profile of its motion, no step; before (E,): it leads to its
+    step: start is from where the motion ends.
     """
 
     row: Ints
@@ -34,6 +35,7 @@ class Ramps:
     length: Floats
     step: Floats
     inside: Bools
+    before: Bools
 
     @staticmethod
     def of(rows: Ints, step: Floats, length: Floats, extent: Floats, carries: Bools) -> Ramps:
@@ -58,7 +60,16 @@ class Ramps:
             np.repeat(length, count)[order],
             np.repeat(step, count, axis=0)[order],
             np.zeros(len(row), bool),
+            np.zeros(len(row), bool),
         )
+
+    @staticmethod
+    def leading(rows: Ints, step: Floats, length: Floats, extent: Floats, carries: Bools) -> Ramps:
+        """As ``of``, of ramps that end where the motions ``rows`` (K,) start: the same from the end of the program."""
+        last = len(carries) - 1
+        back = Ramps.of(last + 1 - rows, -step, length, extent[::-1], carries[::-1])
+        turned = Ramps(*(getattr(back, one.name)[::-1] for one in fields(back)))
+        return replace(turned, row=last - turned.row, before=np.ones(len(turned.row), bool))
 
     @staticmethod
     def profile(row: Ints, share: Floats, rest: Floats, extent: Floats) -> Ramps:
@@ -84,6 +95,7 @@ class Ramps:
             length[some],
             step[some],
             np.ones(int(some.sum()), bool),
+            np.zeros(int(some.sum()), bool),
         )
 
     def only(self, some: Bools) -> Ramps:
@@ -113,14 +125,28 @@ class Ramps:
         for i in range(int(count.max(initial=0))):
             some = np.flatnonzero(count > i)
             part = first[some] + i
-            distance = self.start[part] + share[some] * self.extent[part]
+            ahead = np.where(self.before[part], 1.0 - share[some], share[some])
+            distance = self.start[part] + ahead * self.extent[part]
             added[some] -= np.maximum(1.0 - distance / self.length[part], 0.0)[:, None] * self.step[part]
         return added
+
+    def steps(self) -> tuple[Ints, Floats, Floats]:
+        """Motions (K,) that start with a step, ascending, the lengths (K,) [m] of its ramps, and the shares (K,) of it
+        that go over before."""
+        at = np.flatnonzero((self.start == 0.0) & ~self.inside)
+        vertex = self.row[at] + self.before[at]
+        rows, whose = np.unique(vertex, return_inverse=True)
+        length, size = np.zeros(len(rows)), np.linalg.norm(self.step[at], axis=1)
+        np.maximum.at(length, whose, self.length[at])
+        whole = np.bincount(whose, size, len(rows))
+        early = np.bincount(whose, size * self.before[at], len(rows))
+        return rows, length, early / np.where(whole > 0, whole, 1.0)
 
     def ends(self) -> tuple[Ints, Floats]:
         """Motions (E',) inside of which a ramp ends, ascending, and the shares of their length (E',) where it does."""
         remaining = self.length - self.start
         inside = (remaining > 0.0) & (remaining < self.extent)
         row, share = self.row[inside], remaining[inside] / self.extent[inside]
+        share = np.where(self.before[inside], 1.0 - share, share)
         order = np.lexsort((share, row))
         return row[order], share[order]

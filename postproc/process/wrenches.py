@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -12,12 +11,13 @@ import numpy as np
 from postproc.base.arrays import Bools, FewRows, Floats, Ints, frozen, is_shared, numbers
 from postproc.base.batches import blocks, in_blocks
 from postproc.base.findings import Finding, Refusal
-from postproc.base.geometry import lengths, turn_beside, turning
+from postproc.base.geometry import lengths
 from postproc.base.units import DEG
 from postproc.cell import Cell, MotionFrames
 from postproc.process.feed_frames import FeedFrames
 from postproc.process.force_profiles import ForceProfiles
 from postproc.process.force_ramps import Ramps
+from postproc.process.force_turning import Turning
 from postproc.process.path_length import SMOOTH_TURN, MotionRuns, PathLength
 from postproc.process.stated_forces import BASE, FEED, TOOL, WORLD, StatedForces
 from postproc.toolpath import Kind, Toolpath
@@ -115,21 +115,42 @@ class Wrenches:
         values[rows] += self.ramps.at(rows, np.ones(len(rows)))
         return frozen(values)
 
+    def largest_along(self, rows: Ints) -> Floats:
+        """(K, 6) the wrench of the motions ``rows`` (K,) where their profile has its largest force; at the end of those
+        without one."""
+        wrench = self.at_end[rows].copy()
+        if self.ramps is None or not self.ramps.inside.any():
+            return wrench
+        at, share, _ = self.ramps.only(self.ramps.inside).places()
+        there = self.along(at, share)
+        order = np.lexsort((lengths(there[:, :3]), at))
+        last = np.append(at[order][1:] != at[order][:-1], True)
+        motion, largest = at[order][last], there[order][last]
+        place = np.minimum(np.searchsorted(motion, rows), len(motion) - 1)
+        own = motion[place] == rows
+        wrench[own] = largest[place[own]]
+        return wrench
+
     @cached_property
     def inner_steps(self) -> Ints:
         """Motions (K,) with which the wrench steps inside a cut."""
         before = np.append(False, self.carries[:-1])
         return np.flatnonzero(self.steps & before)
 
-    def ramped(self, rows: Ints, length: Floats, extent: Floats) -> Wrenches:
+    def ramped(self, rows: Ints, length: Floats, extent: Floats, early: Floats) -> Wrenches:
         """The same, where the steps at the start of the motions ``rows`` (K,) go over along ``length`` (K,) [m] of the
-        path; extent (N,) [m]: lengths of the motions."""
+        path, the shares ``early`` (K,) of them before it; extent (N,) [m]: lengths of the motions."""
         if not len(rows):
             return self
         step = self.start[rows] - self.values[rows - 1]
-        steps = self.steps.copy()
+        steps, carries = self.steps.copy(), np.asarray(self.carries)
         steps[rows] = False
-        ramps = Ramps.of(rows, step, length, extent, np.asarray(self.carries))
+        late, lead = np.flatnonzero(early < 1.0), np.flatnonzero(early > 0.0)
+        after = (1.0 - early[late])[:, None] * step[late]
+        ramps = Ramps.of(rows[late], after, length[late], extent, carries)
+        if len(lead):
+            ahead = early[lead, None] * step[lead]
+            ramps = ramps.joined(Ramps.leading(rows[lead], ahead, length[lead], extent, carries))
         return replace(self, steps=steps, ramps=ramps if self.ramps is None else self.ramps.joined(ramps))
 
     def along(self, rows: Ints, fraction: Floats) -> Floats:
@@ -162,44 +183,6 @@ class StartWrenches:
         chosen = numbers(rows, len(self._values))
         own = self._own[chosen]
         return np.where(np.isnan(own), self._values[np.maximum(chosen - 1, 0)], own)
-
-
-@dataclass(frozen=True, eq=False)
-class Turning:
-    """The frames that turn along the path of arcs.  ``mask`` (N,): motions with such a frame; ``feed`` (N,): where the
-    force is stated in the feed frame; ``base_in_robot``, ``tool_in_base`` (N, 3, 3): frames at the ends; ``arc_turn``:
-    as of ``PathLength``."""
-
-    mask: Bools
-    feed: Bools
-    frames: FeedFrames | None
-    base_in_robot: Floats
-    tool_in_base: Floats
-    arc_turn: Callable[[Ints], Floats]
-
-    def along(self, rows: Ints, fraction: Floats, start: Floats, values: Floats) -> Floats:
-        """(K, 6) C(t) ((1 - t) C(0)^T start + t C(1)^T values) [N, N m] at the shares ``fraction`` (K,) of motions
-        ``rows`` (K,), ``start`` and ``values`` (K, 6), with the frame C in the robot's axes."""
-        # tool in the robot where the motion starts, and how it turns along the path
-        first_rotation, last_rotation = (
-            self.base_in_robot[at] @ self.tool_in_base[at] for at in (rows - 1, rows)
-        )
-        arc = self.arc_turn(rows)
-        turn = turn_beside(first_rotation, last_rotation, arc)
-
-        def axes(share: Floats) -> Floats:
-            """(K, 3, 3): the rows of a matrix are the axes of the frame."""
-            matrices = np.swapaxes(turning(first_rotation, turn, arc, share), 1, 2)
-            chosen = np.flatnonzero(self.feed[rows])
-            if self.frames is not None and len(chosen):
-                matrices[chosen] = self.frames.along(rows[chosen], share[chosen])
-            return matrices
-
-        first, here, last = axes(0 * fraction), axes(fraction), axes(0 * fraction + 1)
-        share = fraction[:, None, None]
-        inside = (1 - share) * (start.reshape(-1, 2, 3) @ np.swapaxes(first, 1, 2))
-        inside += share * (values.reshape(-1, 2, 3) @ np.swapaxes(last, 1, 2))
-        return np.asarray((inside @ here).reshape(-1, 6))
 
 
 def is_air(toolpath: Toolpath) -> Bools:

@@ -227,6 +227,7 @@ def _figures(data: PageData) -> dict[str, object]:
         "each": data.arc_points.shape[1],
         "motions": data.motions,
         "corrected": data.corrected,
+        "force_word": data.force_word,
         "tolerance": data.tolerance,
         "kinds": [kind.name for kind in Kind],
         "states": [_STATES[state] for state in MotionOutcome],

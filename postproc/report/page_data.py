@@ -82,6 +82,7 @@ class PageData:
     arcs: Ints
     arc_points: Floats
     force: Floats
+    force_word: str
     deflection: Floats
     correction: Floats
     before: Floats
@@ -136,7 +137,8 @@ def page_data(
         position=_by_blocks(lambda some: task.wanted[some].position, rows) / MM,
         arcs=arcs,
         arc_points=arc_points,
-        force=task.wrench[rows, :3],
+        force=task.force.largest_along(rows)[:, :3],
+        force_word=_force_word(task),
         deflection=result.deflection[rows] / MM,
         correction=_by_blocks(lambda some: _correction(task, result, some), rows) / MM,
         before=before[rows] / MM,
@@ -157,6 +159,12 @@ def _by_blocks(compute: Callable[[Ints], Floats], rows: Ints, each: int = 1) -> 
     """(K each, 3) what ``compute`` returns for ``rows`` (K,)."""
     parts = in_blocks(lambda block: compute(rows[block]), len(rows), ROWS // each)
     return np.concatenate([np.empty((0, 3)), *parts])
+
+
+def _force_word(task: CompensationProblem) -> str:
+    """What the force of a motion is called: where it changes inside of motions it is their largest."""
+    ramps = task.force.ramps
+    return "force" if ramps is None or not ramps.inside.any() else "largest force within the motion"
 
 
 def _correction(task: CompensationProblem, result: CorrectionResult, rows: Ints) -> Floats:

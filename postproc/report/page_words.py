@@ -54,6 +54,10 @@ def program_verdict(data: PageData) -> str:
     if math.isnan(report.before.max):
         return "No motion cuts with a force: no deflection, and nothing is corrected."
     before = f"{report.before.max / MM:.3f} mm{_interval(report.uncertainty, report.uncertainty.before)}"
+    if math.isfinite(report.before_inside):
+        before = (
+            f"{report.largest_before / MM:.3f} mm along motions whose force changes ({before} at the points)"
+        )
     if not data.corrected or report.after is None:
         return (
             f"Without correction, the predicted error of the tool is up to {before}"
@@ -82,7 +86,10 @@ def program_verdict(data: PageData) -> str:
 def program_tiles(data: PageData) -> list[Tile]:
     """Before, after, the worst place, the uncertainty, what is not corrected."""
     report = data.report
-    tiles = [Tile("error before", _mm(report.before.max, 3), _rest(report.before.rms, report.before.p95))]
+    rest = _rest(report.before.rms, report.before.p95)
+    if math.isfinite(report.before_inside):
+        rest = f"along motions whose force changes; at the points {_mm(report.before.max, 3)}, {rest}"
+    tiles = [Tile("error before", _mm(report.largest_before, 3), rest)]
     if data.corrected and report.after is not None:
         tiles.append(Tile("error after", _mm(report.after.max, 4), _rest(report.after.rms, report.after.p95)))
         if report.path_error is not None and np.isfinite(report.path_error.max):

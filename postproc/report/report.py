@@ -105,6 +105,7 @@ class PathFigures:
 class Report(Result):
     """One program.  ``after``, ``path_error`` (between the points) and ``correction`` are None where nothing was to be
     corrected (predict).  ``uncorrected``: motions that stay as they were although they need a correction.
+    ``before_inside`` [m]: largest error across the feed inside of motions along which the force changes, -inf without.
     ``tolerance`` [m] of the cell; ``motion_table``: see ``table``; ``part``: None without a stock."""
 
     headline = (
@@ -134,6 +135,7 @@ class Report(Result):
     force_max_n: float
     force_peak_n: float
     before: Spread
+    before_inside: float
     after: Spread | None
     path_error: Spread | None
     correction: Spread | None
@@ -156,6 +158,12 @@ class Report(Result):
         """One row a motion of the input, the columns of corrections.csv.  Raises ValueError where they were not kept:
         ``postproc.compensate`` and ``postproc.predict`` keep them."""
         return super().table() if self.motion_table is None else self.motion_table
+
+    @property
+    def largest_before(self) -> float:
+        """[m] the largest predicted error before the correction, at the points and, where the force changes inside of
+        motions, between them; NaN without any."""
+        return float(np.fmax(self.before.max, self.before_inside)) if self.cutting else np.nan
 
     @property
     def largest_after(self) -> float:
@@ -201,6 +209,10 @@ class Report(Result):
                 "peak_n": _finite(round(self.force_peak_n, 3)),
             },
             "error_before_mm": {**self.before.as_mm(), "ci95": _finite(self.uncertainty.before / MM)},
+            "largest_error_mm": {
+                "before": _finite(self.largest_before / MM),
+                "after": None if self.after is None else _finite(self.largest_after / MM),
+            },
             "error_after_mm": {**self.after.as_mm(), "ci95": _finite(self.uncertainty.after / MM)}
             if self.after
             else None,

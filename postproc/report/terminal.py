@@ -60,12 +60,16 @@ def report_rows(report: Report) -> Iterable[tuple[str, str]]:
     yield "robot", report.robot
     peak = "" if math.isnan(report.force_peak_n) else f", peaks up to {report.force_peak_n:.0f} N"
     yield "force", f"{report.force_source}, at most {report.force_max_n:.0f} N{peak}"
-    yield "errors", "predicted, at the end points of cutting motions"
-    before = _spread(report.before, _interval(report.uncertainty, report.uncertainty.before))
+    inside = math.isfinite(report.before_inside)
+    covers = "along cutting motions, whose force changes, and at their end points" if inside else ""
+    yield "errors", f"predicted, {covers or 'at the end points of cutting motions'}"
+    along = f"max {report.largest_before / MM:.4f} mm; at end points " if inside else ""
+    before = along + _spread(report.before, _interval(report.uncertainty, report.uncertainty.before))
     yield "error before", f"{before}, orientation {_deg(report.angle_before_deg)}"
     if report.after is not None and report.correction is not None and report.angle_after_deg is not None:
         share = "" if report.gain == 1.0 else f"; gain {report.gain:g}"
-        after = _spread(report.after, _interval(report.uncertainty, report.uncertainty.after))
+        along = f"max {report.largest_after / MM:.4f} mm; at end points " if inside else ""
+        after = along + _spread(report.after, _interval(report.uncertainty, report.uncertainty.after))
         yield "error after", f"{after}, orientation {_deg(report.angle_after_deg)}"
         if report.path_error is not None:
             turned = report.path_error_deg

@@ -207,6 +207,14 @@ _PROGRAM: dict[str, Schema] = {
         "the machining force",
     ),
     "error_before_mm": spread("predicted error at the points before the correction", ci95=_CI95),
+    "largest_error_mm": record(
+        {
+            "before": quantity("mm", "without the correction", nullable=True),
+            "after": quantity("mm", "with it", nullable=True),
+        },
+        "largest predicted error of the program: at the points, and inside of motions after the correction or where the"
+        " force changes there",
+    ),
     "error_after_mm": spread("predicted error at the points after the correction", nullable=True, ci95=_CI95),
     "path_error_mm": spread("predicted path error between points after the correction", nullable=True),
     **_PATH_FIGURES,

@@ -7,7 +7,7 @@ import numpy as np
 from postproc.base import rotary_words
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
-from postproc.compensation.path_comparison import errors_between_as_programmed
+from postproc.compensation.path_comparison import errors_inside
 from postproc.compensation.splines import unknown_displacements
 from postproc.compensation.subdivision import Subdivision
 from postproc.output.write import (
@@ -64,10 +64,9 @@ def closing_findings(request: Request, ready: Prepared, written: WrittenProgram)
 def _changing_forces(ready: Prepared, written: WrittenProgram) -> list[Finding]:
     """Where the force changes inside of motions, and the tool is further off than at their end points."""
     task = ready.task
-    if task.force.ramps is None or not task.force.ramps.inside.any():
+    rows, off = errors_inside(task)
+    if not len(rows):
         return []
-    rows = np.unique(task.force.ramps.row[task.force.ramps.inside])
-    off = errors_between_as_programmed(task, rows)
     at_ends = float(np.nanmax(written.across_before[written.result.scope], initial=0.0))
     worst = int(np.argmax(off))
     if not off[worst] > at_ends:

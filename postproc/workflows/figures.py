@@ -11,6 +11,7 @@ from postproc.base.findings import Finding
 from postproc.base.geometry import lengths
 from postproc.base.units import DEG, MM
 from postproc.compensation.correct import CorrectionResult, MotionOutcome
+from postproc.compensation.path_comparison import errors_inside
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.subdivision import Subdivision, subdivided_motions
 from postproc.compensation.uncertainty import evaluate_uncertainty
@@ -68,6 +69,7 @@ def report_of(
         force_max_n=ready.wrenches.max_force,
         force_peak_n=ready.wrenches.peak_force,
         before=Spread.of(result.before[scope]),
+        before_inside=float(errors_inside(task)[1].max(initial=-np.inf)),
         after=Spread.of(result.after[scope]) if corrected else None,
         path_error=Spread.of(written.path_error) if written else None,
         correction=Spread.of(size[result.corrected]) if corrected else None,
@@ -101,11 +103,11 @@ def _path_figures(
     beside = np.where(result.corrected, result.across_after, across)[rows]
     ahead = np.sqrt(np.maximum(result.after[rows] ** 2 - beside**2, 0.0))
     ramps = task.force.ramps
-    starts = rows[:0] if ramps is None else np.flatnonzero((ramps.start == 0.0) & ~ramps.inside)
+    starts, lengths = (rows[:0], np.empty(0)) if ramps is None else ramps.steps()[:2]
     longest, line = math.nan, 0
-    if ramps is not None and len(starts):
-        most = starts[np.argmax(ramps.length[starts])]
-        longest, line = float(ramps.length[most]), int(task.toolpath.line[ramps.row[most]])
+    if len(starts):
+        most = int(np.argmax(lengths))
+        longest, line = float(lengths[most]), int(task.toolpath.line[starts[most]])
     return PathFigures(
         Spread.of(np.abs(along[scope])),
         Spread.of(across[scope]),

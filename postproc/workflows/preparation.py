@@ -41,7 +41,7 @@ from postproc.toolpath import Toolpath
 from postproc.workflows.cell_force_factors import factored
 from postproc.workflows.cell_tool_errors import cell_tool_displacement
 from postproc.workflows.correction_mode import corrected_model, mode_findings, temperature_rise, touch_off
-from postproc.workflows.ramp_lengths import ramp_lengths
+from postproc.workflows.ramp_lengths import early_shares, ramp_lengths
 from postproc.workflows.reading_findings import configuration_findings, reader_findings
 
 Stage = Callable[[str], None]
@@ -258,7 +258,7 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
         external=external,
         known_error=None if learned is None else learned.known_error,
     )
-    task = add_force_ramps(task, ramp_lengths(cell, path, force))
+    task = add_force_ramps(task, ramp_lengths(cell, path, force), early_shares(cell, task))
     spacing = np.maximum(cell.min_segment, 1e-3 * cell.cycle_ms * np.nan_to_num(path.feed))
     task = add_lost_motion(task, start, spacing)
     tool_findings: tuple[Finding, ...] = ()

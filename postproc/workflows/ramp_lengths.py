@@ -7,7 +7,8 @@ import numpy as np
 from postproc.base.arrays import Floats
 from postproc.base.units import MM
 from postproc.cell import Cell
-from postproc.compensation.ramped_forces import ASSUMED
+from postproc.compensation.problem import CompensationProblem
+from postproc.compensation.ramped_forces import ASSUMED, EarlyShares
 from postproc.process import Wrenches
 from postproc.toolpath import Toolpath
 
@@ -39,3 +40,16 @@ def ramp_lengths(cell: Cell, path: Toolpath, force: Wrenches) -> Floats:
     if force.radius is not None:
         ramp = np.where(np.isnan(force.radius), ramp, force.radius)
     return np.where(np.isnan(ramp), ASSUMED, ramp)
+
+
+def early_shares(cell: Cell, task: CompensationProblem) -> EarlyShares | None:
+    """Which shares of the steps of the force go over before them: with a stock, so that the tool digs into the part
+    least; none where the cell states a ramp, which follows its step."""
+    if task.force.stock is None or cell.force_ramp is not None:
+        return None
+    from postproc.part.step_sides import find_early_shares  # numba: only where there is a stock
+    from postproc.process.stock.simulation import StockRun
+
+    run = task.force.stock
+    assert isinstance(run, StockRun)
+    return lambda rows, change: find_early_shares(task, run, rows, change)

@@ -31,7 +31,7 @@ const quantities = {
   after: { title: 'error after', unit: 'mm', decimals: 4, values: motions.after, bands: true },
   path_error: { title: 'path error between points', unit: 'mm', decimals: 4, values: motions.path_error, bands: true },
   correction: { title: 'correction', unit: 'mm', decimals: 3, values: lengths(motions.correction) },
-  force: { title: 'force', unit: 'N', decimals: 0, values: lengths(motions.force) },
+  force: { title: given.force_word, unit: 'N', decimals: 0, values: lengths(motions.force) },
 };
 
 function extent(values, rows) {
@@ -103,7 +103,7 @@ function words(i) {
     description.push(`error after ${number(motions.after[i], 4)}${wide(motions.after_width)} mm${between}`);
     if (motions.inserted[i]) description.push(`${motions.inserted[i]} inserted before it`);
   }
-  description.push(`force ${number(quantities.force.values[i], 0)} N (${vector(motions.force, i, 0)})`);
+  description.push(`${given.force_word} ${number(quantities.force.values[i], 0)} N (${vector(motions.force, i, 0)})`);
   return description;
 }
 

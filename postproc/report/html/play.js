@@ -66,7 +66,7 @@ function lineOf(view) {
     const source = view.side && view.data.sides > 1 ? written[written.length - 1] : posted;
     text = source ? source.textContent.trim() : '';
   }
-  const force = inAir(chosen) ? 'in air' : `force ${number(quantities.force.values[chosen], 0)} N`;
+  const force = inAir(chosen) ? 'in air' : `${given.force_word} ${number(quantities.force.values[chosen], 0)} N`;
   const tool = view.cutters[chosen] < view.scene.numbers.length ? `tool ${view.scene.numbers[view.cutters[chosen]]}, ` : '';
   return [`line ${motions.line[chosen]}`, text, `${tool}${force}${view.known ? '' : ', the axes of the robot are not known'}`];
 }

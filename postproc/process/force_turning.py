@@ -1,0 +1,50 @@
+"""Forces stated in a frame that turns along the path: linear in that frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.geometry import turn_beside, turning
+from postproc.process.feed_frames import FeedFrames
+
+
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """The frames that turn along the path of arcs.  ``mask`` (N,): motions with such a frame; ``feed`` (N,): where the
+    force is stated in the feed frame; ``base_in_robot``, ``tool_in_base`` (N, 3, 3): frames at the ends; ``arc_turn``:
+    as of ``PathLength``."""
+
+    mask: Bools
+    feed: Bools
+    frames: FeedFrames | None
+    base_in_robot: Floats
+    tool_in_base: Floats
+    arc_turn: Callable[[Ints], Floats]
+
+    def along(self, rows: Ints, fraction: Floats, start: Floats, values: Floats) -> Floats:
+        """(K, 6) C(t) ((1 - t) C(0)^T start + t C(1)^T values) [N, N m] at the shares ``fraction`` (K,) of motions
+        ``rows`` (K,), ``start`` and ``values`` (K, 6), with the frame C in the robot's axes."""
+        # tool in the robot where the motion starts, and how it turns along the path
+        first_rotation, last_rotation = (
+            self.base_in_robot[at] @ self.tool_in_base[at] for at in (rows - 1, rows)
+        )
+        arc = self.arc_turn(rows)
+        turn = turn_beside(first_rotation, last_rotation, arc)
+
+        def axes(share: Floats) -> Floats:
+            """(K, 3, 3): the rows of a matrix are the axes of the frame."""
+            matrices = np.swapaxes(turning(first_rotation, turn, arc, share), 1, 2)
+            chosen = np.flatnonzero(self.feed[rows])
+            if self.frames is not None and len(chosen):
+                matrices[chosen] = self.frames.along(rows[chosen], share[chosen])
+            return matrices
+
+        first, here, last = axes(0 * fraction), axes(fraction), axes(0 * fraction + 1)
+        share = fraction[:, None, None]
+        inside = (1 - share) * (start.reshape(-1, 2, 3) @ np.swapaxes(first, 1, 2))
+        inside += share * (values.reshape(-1, 2, 3) @ np.swapaxes(last, 1, 2))
+        return np.asarray((inside @ here).reshape(-1, 6))
