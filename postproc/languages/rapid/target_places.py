@@ -23,7 +23,7 @@ NUMBERS = 7
 """Of a target that can be corrected: x, y, z and q1 to q4."""
 NOWHERE = ((-1, -1),) * NUMBERS
 _LIST = re.compile(rb"\[[^\[\]]*+\]")
-_LAST_NAME = re.compile(rb"[A-Za-z0-9_]++(?=[ \t]*+\Z)")
+_LAST_NAME = re.compile(rb"(?<![A-Za-z0-9_])[A-Za-z0-9_]++(?=[ \t]*+\Z)")
 _COMMENT = re.compile(rb"(\"[^\"\r\n]*+\")|![^\r\n]*+")
 _EDITABLE = re.compile(rb"[-+]?[ \t]*[0-9.]")
 
