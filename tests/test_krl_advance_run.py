@@ -111,6 +111,15 @@ def test_a_stop_before_the_first_motion_and_after_the_last():
     assert blends(between("I=2") + "WAIT SEC 1\n") == [2, 2, 2, 0]
 
 
+def test_a_stop_before_an_end_in_a_loop_that_is_given_up():
+    """Its rows are taken out again, and so is what ended after them."""
+    end = "IF I==40 THEN\nIF $IN[1] THEN\nRETURN\nENDIF\nENDIF\n"
+    found = blends(f"WHILE I<90\n{LINE.format(0)}{LINE.format(1)}I=I+1\nWAIT SEC 1\n{end}ENDWHILE\n")
+    assert found[0] == 2
+    assert len(found) == 2
+    assert np.isnan(found[1])
+
+
 def test_no_motion_is_planned_ahead():
     assert blends("$ADVANCE=0\n" + between("I=2")) == [0, 0, 0, 0]
     assert blends("$ADVANCE=1\n" + between("I=2")) == [2, 2, 2, 2]

@@ -60,14 +60,30 @@ def last(text: str) -> tuple[np.ndarray, int, str]:
     return path.position[row] / MM, int(path.base[row]), refused[row].code if row in refused else ""
 
 
-@pytest.mark.parametrize("word", ["TOFFL=2", "TOFF[3]=2", "TCARR=1", "TOFFL=R1", "TOFFL=2\nZ1\nTOFFL=3"])
-def test_another_length_leaves_the_tool_elsewhere_along_its_axis(word: str) -> None:
-    place, _, code = last(f"{word}\nG1 X9")
-    assert np.isnan(place[2])
-    assert code == "GCO002"
-    place, _, code = last(f"{word}\nG1 X9 Z3")
-    assert place.tolist() == [9.0, 0.0, 3.0]
+@pytest.mark.parametrize(
+    "word", ["TOFFL=2", "TOFF[3]=2", "TOFFLR=2", "DL=1", "TCARR=1", "TOFFL=R1", "TOFFL=2\nZ1\nTOFFL=3"]
+)
+def test_a_tool_that_the_program_lengthens_or_turns_is_not_the_cells(word: str) -> None:
+    place, _, code = last(f"{word}\nG1 X9 Y2 Z3")
+    assert np.isnan(place).all()
+    assert code == "GCO010"
+
+
+@pytest.mark.parametrize("word", ["TOFFL=0", "TCARR=0", "TOFFL=2\nTOFFL=0", "TCARR=1\nTCARR=0"])
+def test_it_is_the_cells_again_without_that(word: str) -> None:
+    place, _, code = last(f"{word}\nG1 X9 Y2 Z3")
+    assert place.tolist() == [9.0, 2.0, 3.0]
     assert code == ""
+
+
+@pytest.mark.parametrize("word", ["OVR=50", "FGROUP(X,Y)", "ID=1 DO $AC_OVR=30", "FB=30"])
+def test_a_feed_that_is_not_f_is_not_known(word: str) -> None:
+    for text, known in (("", True), (f"{word}\n", word.startswith("FB")), (f"{word} ", False)):
+        raw = f"G90 G17 G54 G71 T1 D1\nG1 X0 Y0 Z5 F100\n{text}G1 X9\nM30\n".encode()
+        if word.startswith("ID") and text.endswith(" "):
+            continue
+        path = SINUMERIK.read((Document(Path("part.mpf"), raw),), DOWN).toolpath
+        assert np.isfinite(path.feed[-1]) == known
 
 
 @pytest.mark.parametrize(

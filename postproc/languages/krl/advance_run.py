@@ -119,11 +119,16 @@ def stopped_motions(rows: MotionRows, continues: Bools) -> dict[int, float]:
         for before in {row - 1} if sources is None else expanded(rows, sources):
             if before >= 0:
                 found[before] = NAN
-    for sources, stop in rows.stopped_at_end:
-        last = {row for row in expanded(rows, sources) if row >= 0}
-        goes_on = expanded(rows, {source for of in rows.sources_of.values() for source in of})
-        surely = stop == Waits.YES and last == {len(rows) - 1} and goes_on.isdisjoint(last)
-        found |= dict.fromkeys(last, 0.0 if surely else NAN)
+    if rows.stopped_at_end:
+        surely, perhaps = (
+            expanded(rows, {source for _, of, stop in rows.stopped_at_end if stop == wanted for source in of})
+            for wanted in (Waits.YES, Waits.MAYBE)
+        )
+        goes_on = expanded(rows, {source for sources in rows.sources_of.values() for source in sources})
+        only = surely - perhaps - goes_on
+        found |= {
+            row: 0.0 if row in only and row == len(rows) - 1 else NAN for row in surely | perhaps if row >= 0
+        }
     # whether the advance run stops before the first motion of another module is not worked out
     called = expanded(rows, {source for _, sources in rows.calls for source in sources})
     return found | {before: NAN for before in called if before >= 0}

@@ -183,7 +183,7 @@ class Calls(BlockFlow):
             return pc + 1
         own = self.stack[active.blocks :]
         if not active.blocks and self.reachable and run.state.stop:
-            run.rows.stopped_at_end.append((run.state.sources, run.state.stop))
+            run.rows.stopped_at_end.append((len(run.rows), run.state.sources, run.state.stop))
         if run.walked and not active.blocks and self.reachable:
             run.rows.left_from |= run.state.sources
         if kind == "return" and not self._is_single(own):

@@ -72,7 +72,7 @@ class MotionRows:
     ``passing``: points of spline blocks; ``entries``: first point of such a block -> line of its header.
     ``arc_blends``: exact arcs -> $APO.CDIS [mm] there.  ``sources_of``: rows that may start elsewhere than where the
     row before ends -> where.  ``stopped``: rows before which the advance run stops (2) or may (1);
-    ``stopped_at_end``: sources of ends of the program before which it does.
+    ``stopped_at_end``: the same of ends of routines: the count of rows, their sources, and 2 or 1.
     ``calls``: the count of rows, and after which ones a routine of another module moves the robot.
     ``left_from``: where routines end after which it is not known what runs.
     ``never_from``: the first row of those that never run.
@@ -91,7 +91,7 @@ class MotionRows:
     whole: dict[int, str] = field(default_factory=dict)
     sources_of: dict[int, frozenset[Source]] = field(default_factory=dict)
     stopped: dict[int, int] = field(default_factory=dict)
-    stopped_at_end: list[tuple[frozenset[Source], int]] = field(default_factory=list)
+    stopped_at_end: list[tuple[int, frozenset[Source], int]] = field(default_factory=list)
     calls: list[tuple[int, frozenset[Source]]] = field(default_factory=list)
     left_from: set[Source] = field(default_factory=set)
     never_from: int | None = None
@@ -191,6 +191,8 @@ class MotionRows:
                 sparse.popitem()
         while self.calls and self.calls[-1][0] > count:
             self.calls.pop()
+        while self.stopped_at_end and self.stopped_at_end[-1][0] > count:
+            self.stopped_at_end.pop()
         while self.ranges and self.ranges[-1][0] >= count:
             self.ranges.pop()
 
