@@ -155,7 +155,7 @@ CODES = define(
             "sign of the deviations is not shown",
             meaning="A compensated program leaves errors that are about as likely with the other sign.",
             consequence="If `# positive:` is wrong, the next part has twice the error; the part after it shows that.",
-            action="Add the measured places (MX, MY, MZ), or probe a place where material was surely left.",
+            action="Add the measured places (MX, MY, MZ), or probe a place that surely has more material than nominal.",
             example="A first part of a robot and forces that are nearly as stated.",
         ),
     }

@@ -132,8 +132,7 @@ def _read(path: Path) -> MeasuredPart:
         )
     if len(rows) < len(table):
         left = len(table) - len(rows)
-        verbs = ("points have", "are") if left > 1 else ("point has", "is")
-        message = f"{left} {verbs[0]} no deviation and {verbs[1]} excluded"
+        message = f"rows without a deviation are excluded: {left} of {len(table)}"
         findings.append(Finding("LRN005", message, str(path), int(table.lines[np.isnan(deviation)][0])))
     _check_sizes(table, point, normal, deviation, rows)
     sigma = _sigma(table, stated, rows)

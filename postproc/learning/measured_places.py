@@ -48,7 +48,9 @@ def sign_shown(
         return turned > enough
     far = int(own[np.argmax(np.abs(deviation[own]))])
     if turned <= enough:
-        raise _refused(table, far, "its measured place lies on the other side of the surface than DEV says")
+        raise _refused(
+            table, far, "DEV contradicts its measured place, which is on the other side of the surface"
+        )
     raise _refused(table, far, "its measured place does not lie off the nominal one by DEV")
 
 

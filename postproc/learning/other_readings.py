@@ -54,7 +54,8 @@ def check_readings(
                 return [wrong_sign(turned, part.file)]
         if part.original:
             uncorrected = np.where(part.points, known.errors(known.before[0]), 0.0)
-            stated = max(present, evidence_of(known, deviation, result.layout))
+            # with effects of their own the two readings become alike: a loop may act as the correction does
+            stated = evidence_of(known, deviation, result.layout)
             compensated = evidence_of(known, deviation + uncorrected, result.layout) - stated
             if compensated > (LIKELIER if alone else EXCHANGED):
                 return [wrong_program(compensated, part.file)]
@@ -90,5 +91,5 @@ def _unseen_sign(gain: float, file: str) -> Finding:
         f"the points do not show the sign of DEV (exp({gain:.1f}) times as likely with the other one): only"
         " `# positive:` states it, and a wrong one doubles the error of the next part"
     )
-    help = "add the measured places of the report as columns MX, MY, MZ, or probe a place where material was left"
+    help = "add the measured places of the report as columns MX, MY, MZ, or probe one with more material than nominal"
     return Finding("LRN019", message, file, help=help)
