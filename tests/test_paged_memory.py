@@ -10,7 +10,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import wraps
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,7 @@ PROGRAMS = (
 )
 LANGUAGE_BLOCKS = plan_rows, dependent_targets, inserting, motion_table, writer, module_toolpath
 """Modules that work on ``BLOCK`` motions at a time."""
+ALONE = "POSTPROC_TEST_ALONE"
 FILES = "postproc_files"
 """numpy's name of the handler."""
 
@@ -138,6 +140,27 @@ def test_every_command_that_reads_a_program_has_room_for_a_large_one(command, mo
     assert asked == [(paged_memory.ROOM * program.stat().st_size * (1 + several), program)]
 
 
+def alone(test: Callable[..., None]) -> Callable[..., None]:
+    """Runs ``test`` in a process of its own: in one that has freed much the C library finds room without new pages."""
+
+    @wraps(test)
+    def run(**fixtures: object) -> None:
+        if ALONE in os.environ:
+            test(**fixtures)
+            return
+        command = [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider"]
+        done = subprocess.run(
+            [*command, f"{__file__}::{test.__name__}"],
+            env=os.environ | {ALONE: "1"},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stdout
+
+    return run
+
+
 def pages_at(address: int) -> str:
     """The line by which the system lists the second page of an array."""
     with open("/proc/self/maps") as stream:
@@ -148,6 +171,7 @@ def pages_at(address: int) -> str:
     raise AssertionError("this memory is not mapped")
 
 
+@alone
 def test_large_arrays_lie_in_files_and_outlive_the_run(small):
     with paged_memory.large_arrays_in_files(Path(__file__)):
         large, zeros = np.arange(100_000), np.zeros(100_000)
@@ -176,6 +200,7 @@ def test_large_arrays_lie_in_files_and_outlive_the_run(small):
     assert os.listdir(small) == []
 
 
+@alone
 def test_pages_are_given_back_and_keep_what_they_hold(small, monkeypatch):
     def resident() -> int:
         return int(Path("/proc/self/statm").read_text().split()[2])
@@ -217,6 +242,7 @@ def test_an_error_is_heard_while_an_array_goes_back(work, error, small):
         work()
 
 
+@alone
 def test_bytes_lie_in_a_file_before_they_are_written(small):
     parts = [bytes([k % 251]) * (k + 1) for k in range(2000)]
     with paged_memory.large_arrays_in_files(Path(__file__)):

@@ -552,8 +552,7 @@ def test_motions_whose_way_is_not_known_are_scaled_where_they_end():
     """The first of a program, PTP motions, and what comes behind an unknown place."""
     kinds = [Kind.LIN, Kind.LIN, Kind.PTP, Kind.LIN, Kind.LIN, Kind.LIN, Kind.PTP, Kind.LIN, Kind.LIN]
     whole, part = (joints_task(process=False, kind=kinds, gain=gain) for gain in (1.0, 0.5))
-    full = correct(whole)
-    division = divided(part, Limits(no_insert=True))[1]
+    full, division = (divided(task, Limits(no_insert=True))[1] for task in (whole, part))
     assert division.moved.all()
     shift, turn = pose_error(full.command[:], whole.wanted)
     half, bent = pose_error(division.command[:], whole.wanted)

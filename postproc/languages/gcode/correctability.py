@@ -143,7 +143,7 @@ def check_correctability(
         "GCO009",
         "tool radius compensation is active: the contour is not the tool's path",
     )
-    refuse(force[Group.ROUNDING] != 0, "GCO016", "the control rounds all corners here (RNDM)")
+    refuse(force[Group.ROUNDING] != 0, "GCO016", "RNDM is active, so the control rounds every corner")
     refuse(force[Group.AXIAL] != 0, "GCO016", "the axes move to the target independently (PTP)")
     for group, message in FRAMED.items():
         refuse(force[group] != 0, "GCO010", f"the coordinates are {message}")
