@@ -11,7 +11,7 @@ from postproc.base.findings import Finding
 from postproc.languages.krl.data import Declarations
 from postproc.languages.krl.expressions import Value, evaluate
 from postproc.languages.krl.lexing import Statement
-from postproc.languages.krl.modal_state import ZERO, FrameRegister, ModalState, Record, joined
+from postproc.languages.krl.modal_state import OVERRIDES, ZERO, FrameRegister, ModalState, Record, joined
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.other_modules import OtherModules
 from postproc.languages.krl.program_blocks import Block, Routine
@@ -48,7 +48,8 @@ class ExecutionContext:
     ``walked``: nothing is known of who calls it; ``walked_rows``: first row, and that after the last, of such routines.
     ``followed``: routines that ran.  ``idle``: what no flow leads to is listed.  ``opaque``: the block, if any, whose
     structure is not understood.  ``spline``: the spline block that is open.  ``has_tcp_mode``, ``has_turning``: some
-    line names another interpolation mode, or another way of turning the tool, than the usual one.  ``initial``: what
+    line names another interpolation mode, or another way of turning the tool, than the usual one; ``has_override``:
+    some line names a speed override.  ``initial``: what
     holds where the program starts.  ``root_set``, ``later_since``, ``later_speed``, ``moved_later``,
     ``ended_later``: what ``ModalState`` calls so.  ``others``: the modules read besides; ``effects_of_others``:
     what their routines change of what this one knows; ``unread``: routines that are called and not read; ``depth``: how
@@ -62,6 +63,7 @@ class ExecutionContext:
     variables: Variables
     has_tcp_mode: bool
     has_turning: bool
+    has_override: bool
     rows: MotionRows
     others: OtherModules
     effects_of_others: Mapping[bytes, Effects]
@@ -127,6 +129,8 @@ class ExecutionContext:
             return
         words = {effect for effect in effects if isinstance(effect, str)}
         self.state.forget(words, why, self.has_tcp_mode, self.has_turning)
+        if "override" in words and self.has_override:
+            self.state.overridden = OVERRIDES
         if "root" in words:
             self.state.root_set = self.state.root_set or self.variables.line
             self.root_set = self.root_set or self.variables.line

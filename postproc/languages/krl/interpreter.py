@@ -51,6 +51,8 @@ _TURNING = re.compile(
 )
 """Where the tool turns otherwise than usual; it starts with what is no letter, so that it is found fast."""
 
+_OVERRIDE = re.compile(rb"\$OV_(?:PRO|ROB)", re.I)
+
 _MARK = f";{MARK}".encode()
 _MARKER = re.compile(rb"(?:\xef\xbb\xbf)?([ \t]*" + _MARK + rb"[^\r\n]*)")
 _MOTION = Statement("motion", b"", b"", 0, 0)
@@ -100,6 +102,7 @@ def read(
             _variables(declarations, surveyed),
             has_tcp,
             has_turning,
+            any(_OVERRIDE.search(document.raw) for document in read),
             MotionRows(source),
             others,
             effects,

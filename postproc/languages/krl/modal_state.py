@@ -190,8 +190,6 @@ class ModalState:
             self.tool_known = True
         if "turning" in words and has_turning:
             self.orientation, self.arc_frame = OrientationMode.UNKNOWN, ArcFrame.UNKNOWN
-        if "override" in words:
-            self.overridden = OVERRIDES
         if "record" in words:
             self.frames_record = self.path_record = self.axis_record = None
 

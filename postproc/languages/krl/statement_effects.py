@@ -1,8 +1,8 @@
 """What a statement changes, reads and calls.
 
-An effect is a word ("point", "base", "tool", "feed", "apo", "mode", "turning", "root", "record", "resume" for the end
-of calls that are under way, "all" for every variable that the program assigns) or the name (bytes) of a variable that
-is assigned.
+An effect is a word ("point", "base", "tool", "feed", "apo", "mode", "turning", "root", "record", "override", "resume"
+for the end of calls that are under way, "all" for every variable that the program assigns) or the name (bytes) of a
+variable that is assigned.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ _MORE = re.compile(rb"[=(:]|\AGOTO\b", re.I)
 MODAL: Effects = {"base", "tool", "feed", "apo", "mode", "turning"}
 """What BAS may set."""
 
-EVERYTHING: Effects = {"point", "record", "all", *MODAL}
+EVERYTHING: Effects = {"point", "record", "override", "all", *MODAL}
 
 _FUNCTION = re.compile(rb"(?<![A-Za-z0-9_$#.'])(" + NAME + rb")[ \t]*\(")
 _WORDS = frozenset(
