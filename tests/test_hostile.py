@@ -453,6 +453,7 @@ ALLOWED = {
     ("base/memory.py", "ctypes"),
     ("base/array_memory.py", "ctypes"),
     ("base/paged_memory.py", "ctypes"),
+    ("base/sized_bytes.py", "ctypes"),
     ("cli/main.py", "import_module"),
     ("posts/freecad/compensate_post.py", "subprocess"),
     ("posts/robodk/kuka_compensated.py", "subprocess"),
