@@ -1,6 +1,6 @@
 """After which motions a motion may run: some known ones, or those that meet at a place where many paths do.
 
-Places where paths meet are told from each other, paths through them are not: so a set of sources stays small, and all
+Places where paths meet are distinguished, paths through them are not: so a set of sources stays small, and all
 sets together are of the size of the program.
 """
 
@@ -13,7 +13,7 @@ MOST = 30
 
 
 class Meeting:
-    """A place where more paths meet than are told from each other; ``sources``: where these come from."""
+    """A place where more paths meet than are distinguished; ``sources``: where these come from."""
 
     __slots__ = ("sources",)
 

@@ -91,7 +91,7 @@ class ModuleRows:
 
     def before(self, row: int) -> tuple[int, ...]:
         """Rows after which a row runs; -1 for the start of the program, -2 for what it does not contain, and alone
-        where they are too many to be told from each other."""
+        where they are too many to be distinguished."""
         at = self.fact_of[row]
         if self.first[at] < row < self.never_from:
             return (row - 1,)
