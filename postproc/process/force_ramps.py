@@ -65,7 +65,9 @@ class Ramps:
 
     @staticmethod
     def leading(rows: Ints, step: Floats, length: Floats, extent: Floats, carries: Bools) -> Ramps:
-        """As ``of``, of ramps that end where the motions ``rows`` (K,) start: the same from the end of the program."""
+        """As ``of``, of ramps that end where the motions ``rows`` (K,) start: the same from the end of the program.
+        step (K, 6) [N, Nm], length (K,) [m]; extent (N,) [m], carries (N,): of all motions.
+        """
         last = len(carries) - 1
         back = Ramps.of(last + 1 - rows, -step, length, extent[::-1], carries[::-1])
         turned = Ramps(*(getattr(back, one.name)[::-1] for one in fields(back)))

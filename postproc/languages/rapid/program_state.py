@@ -25,7 +25,7 @@ class Varying(IntEnum):
 VARYING = Varying.VARYING
 
 
-class _Other(Exception):
+class _ValuesDiffer(Exception):
     """Two values differ."""
 
 
@@ -107,12 +107,12 @@ def same_values(one: PersistentMap, other: PersistentMap) -> bool:
     """Whether the same variables have the same values."""
     try:
         one.merged(other, _checked)
-    except _Other:
+    except _ValuesDiffer:
         return False
     return True
 
 
 def _checked(_: bytes, one: Value | None, other: Value | None) -> Value | None:
     if one != other:
-        raise _Other
+        raise _ValuesDiffer
     return one
