@@ -217,6 +217,7 @@ def test_the_dat_travels_along(compensate, job):
     assert (job.output.with_suffix(".dat")).read_bytes() == data
 
 
+@pytest.mark.slow
 def test_force_before_and_behind_the_program(compensate, job):
     one = compensate("--force", job.program, "--json", "-").json
     two = compensate(job.program, "--force", "--json", "-").json

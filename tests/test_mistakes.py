@@ -178,6 +178,7 @@ MISTAKES = [
 ]  # fmt: skip
 
 
+@pytest.mark.sample(30)
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda mistake: mistake.name)
 def test_a_mistake_is_told_in_words(compensate, job, monkeypatch, mistake):
     monkeypatch.chdir(job.folder)
@@ -195,6 +196,7 @@ def test_a_mistake_is_told_in_words(compensate, job, monkeypatch, mistake):
         assert job.nothing_written()
 
 
+@pytest.mark.slow
 def test_a_batch_without_force_writes_nothing(compensate, job, monkeypatch):
     monkeypatch.chdir(job.folder)
     done = compensate("batch", ".")
