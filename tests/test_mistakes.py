@@ -58,7 +58,9 @@ RUN = (P, f"--force={FORCE}", "--dry-run")
 
 MISTAKES = [
     # forces
-    Mistake("no --force", [], [P], 1, ["FRC030", "FORCE comments", f"run compensate {P} --force"]),
+    Mistake("a folder", [], [".", f"--force={FORCE}"], 1, ["FIL001", "this is a folder", "compensate batch ."]),
+    Mistake("another suffix", [], ["part.nc", f"--force={FORCE}"], 1, ["FIL001", f"is it {P}?"]),
+    Mistake("no --force", [], [P], 1, ["FRC030", "FORCE comments", "add --force to the command"]),
     Mistake(
         "no --force and no force",
         [program(";FORCE -360 50 560 @base", ";"), program(";FORCE 0 200 0", ";")],
