@@ -95,6 +95,8 @@ def test_a_rigid_robot_gives_the_file_back(compensate, job):
     done = compensate(job.program, "--force", "--robot", job.folder / "rigid.yaml")
     assert done.code == 3, done.err
     assert "MOD003 rigid has no compliance" in done.out
+    assert "COR016" not in done.out
+    assert "0 corrected, 0 not corrected" in done.out
     assert job.output.read_bytes() == job.program.read_bytes()
 
 
