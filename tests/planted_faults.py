@@ -16,11 +16,6 @@ from postproc.workflows.program import compensate
 from postproc.workflows.verify import verify
 
 ROOT = Path(__file__).parent.parent
-SOFT = "\neffects:\n  - effect: joint_compliance\n    parameters:\n" + "".join(
-    f"      c{i}: {{value: {value}e-6, unit: rad/(N m), source: made up}}\n"
-    for i, value in enumerate((0.4, 0.3, 0.4, 3.0, 3.3, 2.4), 1)
-)
-"""Of arms that the samples have without a compliance."""
 
 
 class Text:
@@ -295,16 +290,11 @@ external_axes: {E1: {kind: track, direction: +y, limits: [0, 4000], start: 800}}
     (folder / E).write_text("\n".join([*head, home, *lines, away, "END", ""]))
 
 
-def sample(folder, name, robot=""):
-    """A sample's folder; with a compliance that the file of its ``robot`` does not have."""
+def sample(folder, name):
+    """A sample's folder."""
     shutil.copytree(
         ROOT / "samples" / name, folder, ignore=shutil.ignore_patterns("compensated"), dirs_exist_ok=True
     )
-    if robot:
-        known = (ROOT / "robots" / f"{robot}.yaml").read_text().rstrip()
-        (folder / "soft.yaml").write_text(known + "\n" + SOFT)
-        cell = folder / "cell.yaml"
-        cell.write_text(cell.read_text().replace(f"robot: {robot}", "robot: soft.yaml"))
 
 
 class Written:
@@ -316,9 +306,9 @@ class Written:
         if name == "track":
             along_a_track(folder)
         elif name == "rapid":
-            sample(folder, "irb6700_pocket", "abb_irb6700")
+            sample(folder, "irb6700_pocket")
         elif name == "tp":
-            sample(folder, "m900ib_pocket", "fanuc_m900ib_700")
+            sample(folder, "m900ib_pocket")
         else:
             sample(folder, f"kr270_{name}")
         if name == "panel":

@@ -249,6 +249,7 @@ def test_extra_column_stays_in_the_residuals(tmp_path):
     assert [row["weather"] for row in rows] == [f"rain {k + 3}" for k in range(20)]
 
 
+@pytest.mark.slow
 def test_each_file_to_validate_with_has_its_figures(tmp_path):
     data = absolute(tmp_path / "a.csv", 25, [])
     good, bad = absolute(tmp_path / "b.csv", 8, [], seed=6), absolute(tmp_path / "c.csv", 8, [], seed=7)

@@ -234,6 +234,7 @@ def test_a_force_beside_the_program_is_watched(parts):
     assert done(run(parts)) == ["p1.src"]
 
 
+@pytest.mark.slow
 def test_an_output_of_an_earlier_run_is_told(parts):
     run(parts)
     program(parts / "p1.src", 0, WRONG)

@@ -101,6 +101,7 @@ def test_a_cluster_that_is_lost_midway_is_told(parts):
         assert outcome.state == "done" or outcome.findings[0].code in ("BAT005", "BAT006")
 
 
+@pytest.mark.slow
 def test_one_that_fails_stops_no_other(compensate, parts, cluster):
     (parts / "bad.src").write_bytes(b"DEF bad()\r\nLIN {X 1}\r\n\0END\r\n")
     done = compensate("batch", parts, "--force", "--dask", cluster.scheduler_address, "--json", "-")

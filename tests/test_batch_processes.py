@@ -45,6 +45,7 @@ def test_readings_see_what_is_opened(tmp_path):
     assert seen == {str(read): digest_of(read), str(tmp_path / "absent"): "absent"}
 
 
+@pytest.mark.slow
 def test_an_input_that_changes_under_way_leaves_no_record(parts, monkeypatch):
     job = a_job(parts, "p0.src")
 
@@ -136,6 +137,7 @@ def test_a_folder_that_takes_no_lock_is_told(tmp_path):
         assert refusal.value.findings[0].code == "FIL004"
 
 
+@pytest.mark.slow
 def test_nobody_is_beside_the_holder_of_a_lock(tmp_path):
     """Also while its file comes and goes: of every addition nothing is lost."""
     counter = tmp_path / "counter"

@@ -73,6 +73,7 @@ def test_cells_come_in_turn():
     assert cases.cases("single", 300, 1)[:216] == first
 
 
+@pytest.mark.slow
 def test_noise_is_as_stated():
     run = made(case("null_cluttered", "", 0.0, 60, number=1))
     rng = np.random.default_rng(1)
@@ -244,6 +245,7 @@ def test_a_plan_is_filled_in_as_asked():
     assert warm > 1.0
 
 
+@pytest.mark.slow
 def test_tables_count_every_run(tmp_path):
     answer = {"verdict": "unknown", "seconds": 1.0}
     common = {"snr": 2.0, "poses": 15, "reached": True, "rivals": [], "covered": None, "answer": answer}

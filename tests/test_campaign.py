@@ -59,6 +59,7 @@ def test_every_parameter_is_found():
     assert (np.abs(done.value.mean(axis=0) - TRUE) < 3.5 * error).all()
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth():
     done = many()
     inside, count = int(done.covers.sum()), done.covers.size

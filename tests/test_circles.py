@@ -206,7 +206,7 @@ def test_rounding_of_a_straight_line_changes_no_side(compensate, job, effect, ce
     assert np.abs(np.diff(moved)).max() < 0.003
 
 
-@pytest.mark.sample(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", LETTERS)
 @pytest.mark.parametrize("robot", ["general", "rail"])
 def test_arms_of_other_kinds_have_lost_motion_too(compensate, job, robot, effect):

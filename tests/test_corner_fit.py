@@ -112,6 +112,7 @@ def nearest(job: CompensationProblem, division: Subdivision, distance: float, tu
     return largest
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", [0.5e-3, 2e-3])
 def test_a_fitted_corner_follows_the_original(distance: float) -> None:
     job = square(distance)
@@ -169,6 +170,7 @@ def test_what_is_inserted_keeps_the_shortest_length() -> None:
     assert np.linalg.norm(place[inner] - place[inner - 1], axis=1).min() > 0.799e-3
 
 
+@pytest.mark.slow
 def test_without_insertions_no_corner_is_worse() -> None:
     job = square(0.5e-3)
     limits = Limits(no_insert=True)

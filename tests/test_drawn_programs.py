@@ -12,7 +12,7 @@ from judge.drawn import defects, drawn
 SEEDS = [3, 12, 14, 17, 20, 24, 28, 31, 34, 36, 42]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_nothing_is_wrong_in_silence(tmp_path: Path, seed: int) -> None:
     outcome = run(drawn(seed), tmp_path, verify=True)
@@ -20,6 +20,7 @@ def test_nothing_is_wrong_in_silence(tmp_path: Path, seed: int) -> None:
     assert defects(outcome) == []
 
 
+@pytest.mark.slow
 def test_an_arc_between_stops_is_not_cut_short(tmp_path: Path) -> None:
     """What is inserted into it flows, with the approximation that is stated: as short as the tolerance needs."""
     build = krl(

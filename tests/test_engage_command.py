@@ -219,6 +219,7 @@ def write_stl(path, triangles, ascii=False):
 BOX = cuboid([0, 0, -30], [100, 60, 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("triangles", "code", "words"),
     [

@@ -143,7 +143,7 @@ def integrated(cutter, depth, chip=CHIP, slices=4000, angles=4000):
     return force, (thick * r * area).sum()
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("cutter", "depth", "limit"),
     [(BALL, 0.8, 0.02), (BALL, 3.3, 0.02), (BULL, 1.1, 0.005), (BULL, 4.7, 0.005), (CONE, 3.7, 0.005)],

@@ -311,6 +311,7 @@ def test_a_larger_design_is_never_worse(kr270):
     assert all(found.chosen[size].worst < found.at_random[size][1] for size in (8, 9, 10, 12))
 
 
+@pytest.mark.slow
 def test_each_criterion_wins_by_its_own_measure(kr270):
     what = offer(kr270)
     asked = task(kr270, what, tests=np.diag(task(kr270, what).wanted ** -0.5))
@@ -564,6 +565,7 @@ def test_what_the_other_imitates_is_not_told_apart():
     assert chosen.separation[0] < 1e-2
 
 
+@pytest.mark.slow
 def test_poses_that_tell_effects_apart(kr270):
     what = offer(kr270)
     asked = asked_for(kr270, ("gravity_compensator", "joint_stiffening", "joint_compliance"))

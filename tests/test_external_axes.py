@@ -344,6 +344,7 @@ def test_a_base_beside_the_table_stays(tmp_path):
     judged(job(tmp_path, TURNING.replace("BASE_DATA[1]", "BASE_DATA[2]"), TABLE), scene)
 
 
+@pytest.mark.slow
 def test_an_axis_that_carries_nothing(tmp_path):
     scene = Scene(pose(1500, 0, 600))
     judged(job(tmp_path, MOVING, "external_axes: {E1: {kind: fixed}}\n"), scene)

@@ -178,7 +178,7 @@ def test_a_disk_that_is_full_at_any_file(shop):
     assert resource.getrlimit(resource.RLIMIT_FSIZE) == (soft, hard)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["part.src", "part.dat"])
 @pytest.mark.parametrize("stage", ["correcting", "reporting"])
 def test_an_input_that_changes_while_it_is_read(shop, name, stage):

@@ -211,6 +211,7 @@ def test_a_second_run_over_the_first_changes_no_byte(compensate, job):
     assert contents(job.output.parent) == first
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("umask", [0o000, 0o077])
 def test_rights_change_no_byte(compensate, job, umask):
     assert compensate(job.program, "--force").code == 0

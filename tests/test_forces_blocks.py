@@ -131,6 +131,7 @@ def same(long, short, times: int, seed: int) -> None:
     np.testing.assert_allclose(long.along(rows, share), short.along(rows % n, share), atol=1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(40), deadline=None)
 @given(
     st.integers(0, 2**32 - 1),

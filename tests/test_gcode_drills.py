@@ -202,6 +202,7 @@ def check_on_linuxcnc(seed: int, folder: Path) -> tuple[int, int]:
     return int((path.kind != 0).sum()), int((path.drills & free(path)).sum())
 
 
+@pytest.mark.slow
 @needs_rs274
 def test_linuxcnc_drills_where_the_plan_says(tmp_path: Path) -> None:
     assert sum(check_on_linuxcnc(seed, tmp_path)[1] for seed in range(25)) > 60

@@ -134,6 +134,7 @@ def test_a_work_offset_that_the_program_states(text: str, place: list[float] | t
 PROGRAMS = list(posted_programs())
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize(("path", "raw"), PROGRAMS, ids=[path.stem for path, _ in PROGRAMS])
 def test_posted_programs_are_written(path: Path, raw: bytes) -> None:
     dialect = next(one for one in DIALECTS if one.claims(path, raw))

@@ -67,6 +67,7 @@ def test_radii_may_differ_as_linuxcnc_allows(unit: str, radius: float, gap: floa
             assert not compare(motions, read(made)).differences
 
 
+@pytest.mark.slow
 def test_numbering_the_lines_changes_no_motion(tmp_path: Path):
     compared = 0
     for seed in range(500, 512):

@@ -85,6 +85,7 @@ def test_far_frames_are_not_known() -> None:
     assert 0 in path.constraints.refused
 
 
+@pytest.mark.slow
 def test_the_time_of_a_motion_stays(compensate, job) -> None:
     program = read(LINUXCNC, HEAD + "G1 X1 F100\nG93 X2 F5\nG94 X3 F100\n")
     assert program.toolpath.inverse_time_feed.tolist() == [False, False, True, False]

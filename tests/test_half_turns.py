@@ -76,6 +76,7 @@ def test_of_two_senses_that_both_go_the_result_does_not_depend_on_rounding(robot
     assert list(track.half_turns.rows) == [1, 2, 3]
 
 
+@pytest.mark.slow
 def test_chains_of_half_turns_stay_within_the_limits(robot):
     """Half turns and small turns by turns, 60,000 of them: one sense alone would leave the limits soon."""
     a6 = np.cumsum(np.tile([180.0, 7.0, -180.0, -7.0, 180.0, 0.0], 10_000)) + 170.0
@@ -281,7 +282,7 @@ def program(a6: float, half: bool) -> list[str]:
     ]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("a6", [200, -200, 175, 0])
 def test_a_cut_behind_a_half_turn_is_corrected(compensate, job, a6):
     job.cell(CELL)

@@ -57,6 +57,7 @@ def test_programs_are_compensated_and_moved(compensate, hot):
     assert (hot / "compensated" / "one.report.html").exists()
 
 
+@pytest.mark.slow
 def test_a_forgotten_force_ends_the_watch_and_the_programs_stay(compensate, hot):
     for name in ("one", "two"):
         (hot / f"{name}.src").write_bytes(named(name))

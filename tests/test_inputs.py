@@ -118,7 +118,7 @@ def changing(path: Path, stage: str = "correcting"):
     return told
 
 
-@pytest.mark.sample(3)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FILES)
 def test_every_input_that_changes_is_told_and_nothing_is_written(request_, job, name):
     before = set(there(job.folder))
@@ -156,7 +156,7 @@ def test_a_prediction_of_inputs_that_change(request_, job, name):
     assert not (job.folder / "out").exists()
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["part.src", "compensated/part.src", "arm.urdf", "log.csv", "cell.yaml"])
 def test_a_verification_of_inputs_that_change(request_, job, name):
     whole = at(request_, name)
@@ -205,7 +205,7 @@ def test_a_force_that_the_cell_names_and_this_run_does_not_read(request_, job):
         compensate(at(request_, "log.csv", json=job.folder / "milling.yaml"))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["arm.urdf", "log.csv"])
 def test_a_batch_with_an_input_that_changes(request_, job, name):
     whole = at(request_, name, output=job.output)
@@ -301,6 +301,7 @@ def test_whatever_is_read_is_noted():
     assert found == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("option", "name"), [("-o", "loop.src"), ("--json", "loop.json")])
 def test_a_link_that_leads_to_itself_is_replaced(compensate, job, option, name):
     """It is no input, and it is nothing else."""

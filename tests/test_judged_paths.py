@@ -221,6 +221,7 @@ def test_a_planted_fault_is_seen(tmp_path: Path, word: str, by: float, line: int
         assert after.angle.max() > 0.09 * DEG
 
 
+@pytest.mark.slow
 def test_a_missing_point_and_one_that_stops_are_seen(tmp_path: Path) -> None:
     program, output = perfect(tmp_path)
     text = output.read_bytes().decode().split("\r\n")

@@ -155,6 +155,7 @@ def test_a_routine_of_which_nobody_knows_who_calls_it():
     assert blends("", after)[:2] == [2, 0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["WAIT SEC 0.5", "$OUT[3]=TRUE"])
 def test_the_output_is_that_of_exact_motions(tmp_path, compensate, text):
     """The corner is not rounded, so nothing is moved for its rounding: the numbers are those of a program without

@@ -122,6 +122,7 @@ def bases(body: list[str], pairs: dict[int, list[int]]) -> dict[int, set[int]]:
     return found
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=examples(1000))
 @given(programs())
 def test_a_base_that_is_known_is_that_of_every_way(body: list[str]) -> None:

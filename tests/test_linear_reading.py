@@ -109,6 +109,7 @@ def test_measured_time_of_patterns(part):
 SAMPLE = [name for place, name in enumerate(CASES) if place % 191 == 0]
 
 
+@pytest.mark.sample(24)
 @pytest.mark.parametrize("name", SAMPLE)
 def test_a_hostile_file_is_read_or_refused_in_time(name):
     import_readers()

@@ -95,6 +95,8 @@ def test_a_rigid_robot_gives_the_file_back(compensate, job):
     done = compensate(job.program, "--force", "--robot", job.folder / "rigid.yaml")
     assert done.code == 3, done.err
     assert "MOD003 rigid has no compliance" in done.out
+    assert "COR016" not in done.out
+    assert "0 corrected, 0 not corrected" in done.out
     assert job.output.read_bytes() == job.program.read_bytes()
 
 
@@ -217,6 +219,7 @@ def test_the_dat_travels_along(compensate, job):
     assert (job.output.with_suffix(".dat")).read_bytes() == data
 
 
+@pytest.mark.slow
 def test_force_before_and_behind_the_program(compensate, job):
     one = compensate("--force", job.program, "--json", "-").json
     two = compensate(job.program, "--force", "--json", "-").json

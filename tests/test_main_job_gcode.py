@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from conftest import CELL
 
 FLAT = CELL + "orientation: {a: 0, b: 0, c: 180}\nmax_growth: 20\n"
@@ -31,6 +32,7 @@ def test_an_arc_through_a_point_is_corrected_as_one(compensate, job):
     assert verified.json["compensated"]["max"] <= 0.02
 
 
+@pytest.mark.slow
 def test_what_remains_of_the_orientation_is_told(compensate, job):
     """A three-axis program can not turn the tool back."""
     job.cell(FLAT)

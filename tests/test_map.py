@@ -116,6 +116,7 @@ def test_compensated_with_and_without_the_compensator():
     }
 
 
+@pytest.mark.slow
 def test_pictures_of_the_sample_are_what_the_command_draws(compensate, tmp_path):
     """Size apart: another version of the drawing library sets other pixels."""
     for name in ("fig4.png", "fig5.png"):

@@ -234,6 +234,7 @@ def old_word(text, path=""):
     )
 
 
+@pytest.mark.slow
 def test_every_message_has_a_verb():
     wrong = [
         f"{path}:{line}: {text}"

@@ -58,7 +58,9 @@ RUN = (P, f"--force={FORCE}", "--dry-run")
 
 MISTAKES = [
     # forces
-    Mistake("no --force", [], [P], 1, ["FRC030", "FORCE comments", f"run compensate {P} --force"]),
+    Mistake("a folder", [], [".", f"--force={FORCE}"], 1, ["FIL001", "this is a folder", "compensate batch ."]),
+    Mistake("another suffix", [], ["part.nc", f"--force={FORCE}"], 1, ["FIL001", f"is it {P}?"]),
+    Mistake("no --force", [], [P], 1, ["FRC030", "FORCE comments", "add --force to the command"]),
     Mistake(
         "no --force and no force",
         [program(";FORCE -360 50 560 @base", ";"), program(";FORCE 0 200 0", ";")],
@@ -178,6 +180,7 @@ MISTAKES = [
 ]  # fmt: skip
 
 
+@pytest.mark.sample(30)
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda mistake: mistake.name)
 def test_a_mistake_is_told_in_words(compensate, job, monkeypatch, mistake):
     monkeypatch.chdir(job.folder)
@@ -195,6 +198,7 @@ def test_a_mistake_is_told_in_words(compensate, job, monkeypatch, mistake):
         assert job.nothing_written()
 
 
+@pytest.mark.slow
 def test_a_batch_without_force_writes_nothing(compensate, job, monkeypatch):
     monkeypatch.chdir(job.folder)
     done = compensate("batch", ".")

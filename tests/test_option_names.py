@@ -81,6 +81,7 @@ def test_a_misspelt_option_leads_to_the_present_names_only(compensate, job):
     assert "--keep-points" not in run.err
 
 
+@pytest.mark.slow
 def test_the_note_disturbs_no_script(compensate, job):
     done = compensate(job.program, "--force", "--keep-points", "--own-points", "refuse")
     assert done.code == 0

@@ -288,6 +288,7 @@ def test_a_corrected_arc_turns_the_tool_as_the_wanted_one() -> None:
         assert np.abs(piece.at(np.array([share])).rotation - there.rotation).max() > 0.01
 
 
+@pytest.mark.slow
 def test_the_axes_follow_an_arc_that_turns_the_tool() -> None:
     _, track, ways = part_circle(PATH, 0.0)
     q = track.q[1]
@@ -370,6 +371,7 @@ def numbers(line: str) -> np.ndarray:
     return np.array([float(words[key]) for key in "XYZABC"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("own", [True, False], ids=["kept from a LIN", "kept from the PTP"])
 def test_a_cut_that_keeps_its_orientation_is_corrected_in_its_place(compensate, job, own) -> None:
     """Written turns do nothing: on MuJoCo's arm, with the orientation that is kept, the tool is where it is meant."""
@@ -419,6 +421,7 @@ def text_angles(line: str) -> str:
     return line.rpartition("{")[2].partition("A ")[2].partition("}")[0]
 
 
+@pytest.mark.slow
 def test_under_var_the_same_cut_is_turned(compensate, job) -> None:
     """What the test above would miss if $ORI_TYPE were not looked at."""
     job.cell(CELL)
@@ -428,6 +431,7 @@ def test_under_var_the_same_cut_is_turned(compensate, job) -> None:
     assert not all(text_angles(line) in written for line in CUT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("switch", "corrected"),
     [("$ORI_TYPE=#JOINT", 0), ("$CIRC_TYPE=#PATH", 4), ("$ORI_TYPE=#VAR", 4), ("$ORI_TYPE=#IGNORE", 0)],

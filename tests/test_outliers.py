@@ -238,6 +238,7 @@ def outlier_limit(count):
     return chi.ppf(0.99 ** (1 / count), 3)
 
 
+@pytest.mark.slow
 def test_exact_readings_have_none():
     """What is left of them is rounding, and as heavy-tailed as that is."""
     for kind in ("deflections", "tracker"):

@@ -200,6 +200,7 @@ def test_large_arrays_lie_in_files_and_outlive_the_run(small):
     assert os.listdir(small) == []
 
 
+@pytest.mark.slow
 @alone
 def test_pages_are_given_back_and_keep_what_they_hold(small, monkeypatch):
     def resident() -> int:
@@ -242,6 +243,7 @@ def test_an_error_is_heard_while_an_array_goes_back(work, error, small):
         work()
 
 
+@pytest.mark.slow
 @alone
 def test_bytes_lie_in_a_file_before_they_are_written(small):
     parts = [bytes([k % 251]) * (k + 1) for k in range(2000)]

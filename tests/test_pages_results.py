@@ -83,6 +83,7 @@ def test_the_page_says_what_the_terminal_says(one):
     assert not re.search(r"<th[^>]*></th>", page.read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_the_page_is_among_the_outputs_and_leads_to_the_others(one):
     result, page, *_ = one
     assert str(page) in result.outputs

@@ -142,6 +142,7 @@ def test_the_orientation_is_that_of_the_place_where_the_tool_is(turning):
     assert angle[0] == pytest.approx(max(apart), rel=0.02)
 
 
+@pytest.mark.slow
 def test_an_arc_on_which_the_tool_turns_is_divided_until_it_turns_in_its_place(compensate, turning):
     done = compensate(turning.program, "--force", "--json", "-")
     assert done.json["angle_way_after_deg"]["max"] < 0.01

@@ -394,6 +394,7 @@ SINGULAR = ["PLC002", "singularity", "margin 55"]
         (["--turn=30:-30"], 2, ["no width", "not below"]),
         (["--x", "a:b"], 2, ["'a' is not a number"]),
         (["--track", "0:100"], 1, ["PLC003", "linear track"]),
+        (["--x", "1.2:1.8", "--y", "-0.5:0.5"], 1, ["PLC002", "for metres write --x 1200:1800"]),
         (["--x", "9000:9500"], 1, ["PLC002", "part.src:", "out of reach"]),
         pytest.param(["--x", "2200:2300", "--y=900:950"], 1, ["PLC002", "part.src:", "none of"], marks=SLOW),
         pytest.param(

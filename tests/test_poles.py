@@ -193,7 +193,7 @@ def leaning(pair: str, lean: float, outer: float) -> str:
 PAIRS = {"BC": (-45.0, -30.0), "AC": (60.0, 75.0), "AB": (3.0, -2.0)}
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("pair", PAIRS)
 @pytest.mark.parametrize("lean", range(9))
 def test_a_cut_that_begins_upright_and_leans(compensate, job, pair, lean):
@@ -227,7 +227,7 @@ CUTS = {
 }
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("control", HEADS)
 @pytest.mark.parametrize("name", CUTS)
 def test_words_stay_near_those_of_their_own_place(compensate, job, control, name):
@@ -248,6 +248,7 @@ def test_words_stay_near_those_of_their_own_place(compensate, job, control, name
     assert ("COR006" in told) == (report["path_error_deg"]["max"] > 0.01)
 
 
+@pytest.mark.slow
 def test_how_words_run_between_blocks_is_told(compensate, job):
     """What another control would do is half a degree elsewhere here: said, by the figure of this reader."""
     one, two = np.array([0.0, 20.0, -30.0]), np.array([0.0, 20.0, 10.0])
@@ -267,7 +268,7 @@ def vector(lean: float, about: float) -> str:
     return f"A3={x:.6f} B3={y:.6f} C3={z:.6f}"
 
 
-@pytest.mark.sample(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("lean", range(9))
 def test_vectors_have_no_pole_there(compensate, job, lean):
     points = [
@@ -282,6 +283,7 @@ def test_vectors_have_no_pole_there(compensate, job, lean):
     assert max(report["angle_after_deg"]["max"], report["path_error_deg"]["max"]) <= 0.01
 
 
+@pytest.mark.slow
 def test_a_lead_in_that_turns_the_tool(compensate, job):
     """In air the tool leans back to upright, passes the pole, and enters the cut on the other side of it."""
     job.cell(CELL + "orientation: {a: 0, b: 0, c: 180}\nmax_growth: 20\ndialect: {name: fanuc}\n")
@@ -322,6 +324,7 @@ def test_a_part_of_the_correction_swings_no_more(compensate, job, gain):
     assert np.abs(judged.change).max() <= SWING
 
 
+@pytest.mark.slow
 def test_arcs_turn_by_their_words(compensate, job):
     """Words run evenly with the angle of an arc; inserted parts of it have those of their place."""
     job.cell(CELL + "orientation: {a: 0, b: 0, c: 180}\nmax_growth: 20\ndialect: {name: fanuc}\n")
@@ -348,6 +351,7 @@ def test_arcs_turn_by_their_words(compensate, job):
         assert np.abs(block.words - wanted)[2] <= 10.0, block
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "points",
     [
@@ -366,6 +370,7 @@ def test_other_numbers_of_words(compensate, job, points):
     assert (report["path_error_deg"]["max"] <= 0.01) == whole
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", ["a: 30, b: 0, c: 0", "a: -120, b: 8, c: -5"])
 def test_in_a_turned_base(compensate, job, turn):
     """The words turn the tool in the axes of the base, the pole is the base's z."""

@@ -223,7 +223,7 @@ def compare(raw: bytes, seed: int) -> int:
     return int(quick.text.motions.is_plain(every).sum())
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(0, 240, 20))
 def test_runs_of_common_lines_are_what_they_are_one_by_one(seed: int) -> None:
     together = sum(compare(Drawing(one).program(), one) for one in range(seed, seed + 20))

@@ -123,6 +123,7 @@ def ran(request, tmp_path_factory):
     return request.param.partition(",")[0], run(RUNS[request.param], folder), folder
 
 
+@pytest.mark.sample(6)
 def test_a_result_is_what_its_schema_says(ran):
     name, result, _ = ran
     assert result["exit"] in (0, 3) or name == "batch", result["findings"]
@@ -236,6 +237,7 @@ def value_of(holder, key):
     return holder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FAILING)
 def test_so_is_the_result_of_a_failure(name, tmp_path):
     result = run(FAILING[name], tmp_path)
@@ -253,6 +255,7 @@ def test_the_files_are_the_result(tmp_path):
     assert json.loads((tmp_path / "two" / written).read_bytes()) == predicted
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "file"),
     [("report", "compensated/taught.corrections.csv"), ("predict", "reports/taught.deflection.csv")],

@@ -320,6 +320,7 @@ def test_case_files(program: Path, tmp_path: Path) -> None:
     agree(program, tmp_path)
 
 
+@pytest.mark.slow
 @needs_rs274
 def test_most_case_files_are_accepted(tmp_path: Path) -> None:
     programs = sorted(CASES.glob("*.ngc"))

@@ -53,6 +53,7 @@ def test_panel(compensate, sample):
             assert old.startswith(b"LIN {Z ")
 
 
+@pytest.mark.slow
 def test_taught(compensate, sample):
     folder = sample("kr270_taught")
     done = compensate(folder / "taught.src", "--force", "--json", "-")

@@ -203,6 +203,7 @@ def test_a_mirrored_tracker(change, axis):
     assert "with two of X, Y, Z exchanged, or one of them with the other sign (" in message
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("unit", "size"), [("metres", 1e-3), ("inches", 1 / 25.4), ("micrometres", 1e3)])
 @pytest.mark.parametrize("kind", ["tracker", "robot"])
 def test_places_in_another_unit(kind, unit, size):
@@ -250,6 +251,7 @@ def test_exchanged_columns_of_a_real_robot():
     assert "the columns of A4 and A5 exchanged" in message
 
 
+@pytest.mark.slow
 def test_exchanged_columns_of_a_wrist():
     """The tracker sees some 20 mm of it."""
     readings, asked = campaign("ur5", "tracker", np.random.default_rng(7))

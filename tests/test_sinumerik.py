@@ -197,6 +197,7 @@ def test_an_expression_ends_inside_of_the_line(text: bytes, at: int) -> None:
     constant(text)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=examples(300))
 @given(st.binary(max_size=200).map(lambda raw: b"G54 G71 T1\nG0 X0 Y0 Z0\n" + raw))
 @pytest.mark.parametrize("dialect", [SINUMERIK, KUKA], ids=lambda dialect: dialect.name)

@@ -46,7 +46,7 @@ def volume_by_solids(points, axes, cutter):
     return before - stock.volume()
 
 
-@pytest.mark.sample(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("cutter", [FLAT, BALL, BULL, CONE], ids=lambda cutter: cutter.shape)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_random_programs_remove_what_the_solids_say(cutter, seed):

@@ -75,6 +75,7 @@ def test_a_refusal_stays_one(job):
         assert shell(job.folder, "part.src --wrong", redirected)[0] == 2
 
 
+@pytest.mark.slow
 def test_a_quiet_run_needs_no_output(job):
     assert shell(job.folder, "check part.src -q", ">&-")[0] == 0
     assert shell(job.folder, "check part.src -q", ">/dev/full")[0] == 0

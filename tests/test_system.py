@@ -201,6 +201,7 @@ def _count(folder: str, times: int) -> None:
             counter.write_text(str(int(counter.read_text()) + 1))
 
 
+@pytest.mark.slow
 def test_processes_that_are_spawned_hold_a_lock_one_after_another(tmp_path):
     (tmp_path / "counter").write_text("0")
     spawn = multiprocessing.get_context("spawn")

@@ -106,6 +106,7 @@ def test_the_program_moves_off_the_wall_by_what_the_tool_is_too_large(tmp_path):
     assert np.abs(np.median(other["z"] - one["z"])) < 0.01
 
 
+@pytest.mark.slow
 def test_intervals_consider_what_has_no_name():
     """Gaps that are there in every second draw: the standardised errors of the causes have the variance 1, and far
     more where the gaps are not considered."""

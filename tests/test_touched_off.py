@@ -255,6 +255,7 @@ def test_points_that_can_not_be_touched_are_refused(compensate, job, points, cod
     refused(compensate, job, code, CELL.count("\n") + 4, *words)
 
 
+@pytest.mark.slow
 def test_of_several_bases_it_must_be_clear_which_was_touched(compensate, job):
     heavy_robot(job.folder)
     job.write([*PLATE[:-1], *TWO_BASES, "END"])
@@ -325,6 +326,7 @@ def test_what_the_process_leaves_is_named(compensate, job):
     assert told(compensate, job, effects="") == {}
 
 
+@pytest.mark.slow
 def test_what_is_left_to_the_controller_is_named(compensate, job):
     mode = ["correct: absolute", "temperature: 24"]
     assert told(compensate, job, STATED, *mode) == {}

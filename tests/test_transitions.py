@@ -98,6 +98,7 @@ OFFSETS = """
 TOUCHED = "touch_points: [[0, 0, 0], [300, 0, 0], [0, 300, 0], [300, 300, 0]]\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["absolute\n", f"touched_off\n{TOUCHED}"], ids=["absolute", "touched_off"])
 def test_a_cut_is_entered_in_air_where_air_is_corrected_as_well(compensate, job, mode):
     """Nothing is between the motion in air and the cut, which ends and starts under the force; ``verify`` agrees."""
@@ -206,6 +207,7 @@ def test_short_programs_may_grow_by_a_few_motions(growth, least, allowed):
     assert Limits(max_growth=growth, least=least).inserted(26) == allowed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("feed", "cycle"), [(0.05, 0.012), (0.5, 0.012), (0.5, 0.1)])
 def test_no_piece_is_shorter_than_the_controller_runs_without_slowing(feed, cycle):
     job = circle(tolerance=1e-9)
@@ -271,7 +273,7 @@ REVERSED = [
 ]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("tolerance", ["0.02", "0.5", "10"])
 @pytest.mark.parametrize(
     "words", [(), ("--no-insert",), ("--gain", "0.1"), ("--keep-points", "--gain", "0.5")]
@@ -417,6 +419,7 @@ def ramp_ended(distance, exact_stays=False, **limits):
     return places, compare_corners(job, result, division)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", [2e-3, 0.0])
 def test_a_point_where_a_ramp_ends_is_rounded_less_by_another_beside_it(distance):
     """A parabola leaves it at half of the shorter piece beside it at most: d k / 4 for a turn k of the correction."""

@@ -48,6 +48,7 @@ def square(distance: float) -> CompensationProblem:
     return add_force_ramps(stepped, 5e-3)
 
 
+@pytest.mark.slow
 def test_up_to_the_distance_that_is_found_all_corners_hold_the_tolerance_and_beyond_it_not() -> None:
     job = square(np.nan)
     division = subdivide(job, correct(job), FREE)

@@ -79,6 +79,7 @@ def test_nothing_moves_where_nothing_is_off():
     assert moved(model, restore_unmoved_parameters(every)) == set()
 
 
+@pytest.mark.slow
 def test_compliances_and_weights_that_are_as_stated_stay():
     model, every, _ = fitted({"link_geometry.dx4": 2e-4}, weights=True)
     assert {"joint_compliance.c2", "link_gravity.mx2"} <= moved(model, every)

@@ -241,6 +241,7 @@ def test_deflections_are_judged_as_they_are():
 # Bootstrap
 
 
+@pytest.mark.slow
 def test_on_well_posed_data_the_bootstrap_agrees_with_the_covariance():
     rng = np.random.default_rng(11)
     case = measured(40, rng, straight=True)
@@ -303,6 +304,7 @@ def test_readings_that_share_an_error_are_drawn_together():
     assert (ratio < 1.35).all()
 
 
+@pytest.mark.slow
 def test_a_prior_is_drawn_too():
     """Of a parameter that the readings hardly see the bootstrap gives the prior's deviation back."""
     rng = np.random.default_rng(14)

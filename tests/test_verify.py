@@ -190,8 +190,16 @@ def test_the_original_itself_is_above_tolerance_and_has_no_mark(compensate, job)
     )
 
 
-def test_without_force_there_is_nothing_to_look_at(compensate, job):
-    done = compensate("verify", job.program, job.program)
+@pytest.mark.parametrize("command", ["verify", "predict"])
+def test_without_force_there_is_nothing_to_predict(compensate, job, command):
+    done = compensate(command, job.program, *[job.program] * (command == "verify"))
+    assert done.code == 1
+    assert "FRC030" in done.err
+    assert "add --force to the command" in done.err
+
+
+def test_a_program_that_never_cuts_with_a_force(compensate, job):
+    done = compensate("verify", job.program, job.program, "--force", "0,0,0@base")
     assert done.code == 3
     assert "VER004" in done.out
     assert "verdict: no motion cuts with a force" in done.out

@@ -65,7 +65,7 @@ def scanned(original, run, motion, share, around, window=15 * MM, step=0.01 * MM
     return middle, off[0]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "original",
     [

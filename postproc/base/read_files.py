@@ -77,9 +77,23 @@ def _read(path: Path, largest: int | None, take: Callable[[BinaryIO, int], bytes
             raw = take(stream, status.st_size)
     except (OSError, ValueError) as error:  # ValueError: a name with NUL
         why = getattr(error, "strerror", None) or error
-        raise Refusal(Finding("FIL001", f"the file cannot be read: {why}", str(path))) from None
+        help = _similar(path) if isinstance(error, FileNotFoundError) else ""
+        raise Refusal(Finding("FIL001", f"the file cannot be read: {why}", str(path), help=help)) from None
     note(path, raw)
     return raw
+
+
+def _similar(path: Path) -> str:
+    """A help that names the file whose name is nearest to that of ``path``; "" where none is near."""
+    try:
+        names = [one.name for one in path.parent.iterdir() if one.is_file()]
+    except OSError:
+        return ""
+    from difflib import get_close_matches  # takes its time to load
+
+    stems = [name for name in names if Path(name).stem.lower() == path.stem.lower()]
+    near = stems if len(stems) == 1 else get_close_matches(path.name, names, 1, 0.8)
+    return f"is it {path.with_name(near[0])}? check the path and the right to read it" if near else ""
 
 
 def _whole(stream: BinaryIO, size: int) -> bytes:

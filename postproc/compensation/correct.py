@@ -97,7 +97,7 @@ def correct(task: CompensationProblem) -> CorrectionResult:
 
     # What the force does, everywhere it can be predicted; the correction, where it may be made.
     predictable = np.flatnonzero(scope & cartesian & (track.status >= 0) & track.reachable)
-    may = on & ~spread_over_cuts(_in(why, n), cut)
+    may = on & ~spread_over_cuts(_in(why, n), cut) & task.deflects
     corrections = _Findings(n)
     for block in in_blocks(
         lambda part: _correct_block(task, predictable[part], may[predictable[part]]), len(predictable)
@@ -119,7 +119,7 @@ def correct(task: CompensationProblem) -> CorrectionResult:
     )
 
     state = np.full(n, MotionOutcome.AIR, np.int8)
-    state[scope] = MotionOutcome.UNCORRECTED
+    state[scope] = MotionOutcome.UNCORRECTED if task.deflects else MotionOutcome.AIR
     state[off] = MotionOutcome.OFF
     state[keeps] = MotionOutcome.CORRECTED
     findings += uncorrected_findings(task.file, path, cut, why)

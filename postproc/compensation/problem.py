@@ -70,6 +70,12 @@ class CompensationProblem:
         return self.force.at_end
 
     @property
+    def deflects(self) -> bool:
+        """Whether anything that is to be corrected can move the tool."""
+        model = self.model
+        return not self.process or model.is_compliant or model.by_direction or self.known_error is not None
+
+    @property
     def carries(self) -> Bools:
         """(N,) the motion has a force."""
         return self.force.carries

@@ -277,7 +277,7 @@ FORCE_CODES = define(
         "FRC030": Code(
             "error",
             "force is not requested",
-            meaning="A run without --force corrects the effect of no force, so it corrects nothing.",
+            meaning="A run without --force predicts and corrects the effect of no force, which is nothing.",
             consequence="Nothing was written: the output would be the input.",
             action=(
                 "Run with --force. It takes FORCE comments of the program, a force CSV beside it, or `force:`"

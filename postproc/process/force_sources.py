@@ -59,11 +59,11 @@ def wrenches(
 
 
 def not_requested(program: Path, toolpath: Toolpath, cell: Cell) -> Finding:
-    """FRC030: a run without --force, which would correct nothing; its help names the force that the program has, or
-    all ways to state one."""
+    """FRC030: a run without --force, which would predict and correct nothing; its help names the force that the program
+    has, or all ways to state one."""
     source = _found(program, toolpath, cell)
-    help = f"run compensate {program.name} --force" if source else ways_to_state(program, cell)
-    message = "--force is missing, and without a force nothing is corrected: nothing was written"
+    help = "add --force to the command" if source else ways_to_state(program, cell)
+    message = "--force is missing, and without a force there is no deflection to predict or to correct"
     return Finding("FRC030", message + (f"; {source}" if source else ""), str(program), help=help)
 
 

@@ -114,6 +114,8 @@ def _transition_moves(report: Report) -> str:
 
 def _before_after(before: Spread, after: Spread) -> str:
     """Two spreads of one kind of error, in mm."""
+    if math.isnan(before.max):
+        return "-"
     one, two = (f"max {s.max / MM:.4f}, rms {s.rms / MM:.4f} mm" for s in (before, after))
     return f"{one} before; {two} after"
 

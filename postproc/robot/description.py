@@ -355,6 +355,11 @@ def parameter_value(section: YamlSection, si_unit: str) -> Value:
     if "ci95" in section:
         interval, level = section.number("ci95", low=0.0) * factor, 0.95
     elif "ci" in section:
-        section.text("ci_level", choices=("unstated",))
+        help = "write ci95: for the half width of a 95 % interval, or ci: with ci_level: unstated"
+        if "ci_level" not in section:
+            raise section.error("YML003", "the key 'ci_level' is missing", help=help)
+        level_word = section.text("ci_level")
+        if level_word != "unstated":
+            raise section.error("YML004", f"the level of ci is {level_word[:20]!r}", "ci_level", help)
         interval = section.number("ci", low=0.0) * factor
     return Value(section.number("value") * factor, interval, level, section.text("source"))

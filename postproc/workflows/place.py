@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,6 +31,9 @@ from postproc.workflows.preparation import Stage, silent
 
 POOL = 1500
 """Places that the regret is taken against."""
+
+METRES = 10.0
+"""[mm] All ranges that lie within so little are taken for metres."""
 
 EXACT = 20_000
 """Places on paths up to which every listed place is predicted as the main job does; of more, the best one and the
@@ -223,7 +227,16 @@ def _no_place(problem: PlaceProblem, result: SearchResult, dropped: list[Finding
         f"none of {result.looked} places is feasible; at the one nearest to it ({where}) this motion {what}"
         + (f", and {count - 1} more places of the programs lack too" if count > 1 else "")
     )
-    return Finding("PLC002", message, file, line)
+    return Finding("PLC002", message, file, line, help=_metres(request.ranges))
+
+
+def _metres(ranges: Mapping[str, tuple[float, float]]) -> str:
+    """A help where all lengths of ``ranges`` [mm] are those of metres; "" otherwise."""
+    lengths = {name: ranges[name] for name in ("x", "y", "z") if name in ranges}
+    if not lengths or any(max(-low, high) >= METRES for low, high in lengths.values()):
+        return ""
+    name, (low, high) = next(iter(lengths.items()))
+    return f"ranges are in mm: for metres write --{name} {1000 * low:g}:{1000 * high:g}"
 
 
 def _findings(

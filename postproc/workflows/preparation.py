@@ -25,7 +25,7 @@ from postproc.effects import Conditions
 from postproc.languages import DIALECTS, detect
 from postproc.languages.dialect import Dialect, Program, ReadingSettings, read_with_siblings
 from postproc.model import StiffnessModel
-from postproc.process import Wrenches, is_no_force, wrenches
+from postproc.process import Wrenches, is_no_force, not_requested, wrenches
 from postproc.robot.axis_track import (
     all_axes,
     external_joint,
@@ -187,6 +187,9 @@ def find_cell_beside(program: Path) -> Cell | None:
 
 def read_document(path: Path) -> Document:
     """A file of a program.  Raises Refusal FIL001 (not readable), FIL003 (no text)."""
+    if os.path.isdir(path):
+        help = f"name a program; compensate batch {path} compensates those of a folder"
+        raise Refusal(Finding("FIL001", "this is a folder, not a program", str(path), help=help))
     return Document(path, read_text_file(path))
 
 
@@ -286,6 +289,13 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
     if not isinstance(robot.nominal, SerialArm):
         findings += configuration_findings(request.program, path, track)
     return Prepared(program, dialect, settings, cell, robot, model, force, task, tuple(findings), inputs)
+
+
+def refuse_without_force(request: Request, ready: Prepared) -> None:
+    """Raises Refusal FRC030 where no force is stated and nothing else deflects the tool."""
+    if request.force is None and ready.task.process:
+        program = ready.program
+        raise Refusal(not_requested(request.program, program.toolpath, ready.cell), *program.findings)
 
 
 def cell_of(request: Request) -> Cell:

@@ -36,7 +36,6 @@ from postproc.output.write import (
     writing_settings,
 )
 from postproc.part.part_figures import PartFigures
-from postproc.process import not_requested
 from postproc.report.corrections_csv import correction_table, corrections_csv
 from postproc.report.diff import unified_diff
 from postproc.report.page import beside, program_page
@@ -52,6 +51,7 @@ from postproc.workflows.preparation import (
     Stage,
     completed,
     prepare,
+    refuse_without_force,
     silent,
 )
 from postproc.workflows.ramp_lengths import nearest_point
@@ -68,6 +68,7 @@ def predict(request: Request, stage: Stage = silent) -> Report:
 
 def _predict(request: Request, stage: Stage) -> Report:
     ready = prepare(request)
+    refuse_without_force(request, ready)
     stage("predicting")
     result = correct(replace(ready.task, gain=0.0))
     part, of_part = part_error_of(ready, None)
@@ -118,8 +119,7 @@ def _compensate(request: Request, stage: Stage) -> Report:
                 help="compensate the original instead, or use --allow-compensated if this is intended",
             )
         )
-    if request.force is None and ready.task.process:
-        raise Refusal(not_requested(request.program, program.toolpath, ready.cell), *program.findings)
+    refuse_without_force(request, ready)
     stage("correcting")
     target = _target(request)
     excluded: dict[int, Finding] = {}

@@ -18,7 +18,14 @@ from postproc.report.verified import PathComparison, Verified, WorstError
 from postproc.verification.differences import Difference, PathManner, in_air, missing, on_cuts
 from postproc.verification.pairing import Different, pair_motions
 from postproc.verification.simulator import STEP, Simulation, Simulator
-from postproc.workflows.preparation import Prepared, Request, Stage, prepare, silent
+from postproc.workflows.preparation import (
+    Prepared,
+    Request,
+    Stage,
+    prepare,
+    refuse_without_force,
+    silent,
+)
 
 WORST = 10
 """Places that are listed."""
@@ -42,6 +49,7 @@ def verify(
 
 def _verify(request: Request, compensated: Path, step: float, stage: Stage, page: Path | None) -> Verified:
     ready = prepare(request)
+    refuse_without_force(request, ready)
     stage("reading the compensated program")
     other = prepare(_without_force(request, compensated, ready))
     try:
@@ -189,7 +197,7 @@ def _figures(
         findings.append(Finding("VER004", message, str(file)))
     if judged and not len(samples.motion) + len(simulation.points):
         findings.append(
-            Finding("VER004", "no motion under force is simulated: is --force missing?", str(file))
+            Finding("VER004", "no motion under force is simulated: the force of all motions is 0", str(file))
         )
     return findings
 
