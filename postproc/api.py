@@ -10,9 +10,9 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Literal
 
-from postproc.api_place import as_path, assign, place, stated_force
+from postproc.api_place import Force, PathLike, as_path, assign, place, stated_force
 from postproc.api_robot import diagnose, identify, map, plan
 from postproc.base.findings import Finding, Refusal
 from postproc.base.units import MM
@@ -31,8 +31,6 @@ from postproc.report.verified import Verified
 from postproc.workflows import listing, program
 from postproc.workflows.option_names import SHARED_POINTS, accept_former_names
 from postproc.workflows.preparation import Request
-
-PathLike: TypeAlias = str | os.PathLike[str]
 
 __all__ = [
     "Batched",
@@ -69,7 +67,7 @@ __all__ = [
 def compensate(
     path: PathLike,
     *,
-    force: bool | str = False,
+    force: Force = False,
     cell: PathLike | None = None,
     robot: str | None = None,
     gain: float = 1.0,
@@ -85,12 +83,13 @@ def compensate(
 ) -> Report:
     """Compensate a program for the deflection of the robot, as ``compensate PROGRAM`` does.
 
-    force: True for the forces that belong to the program, or ``"0,360,560@base"`` (N, N m), or a CSV; cell: instead of
-    the nearest ``cell.yaml``; robot: name or file, instead of the cell's; gain: share of the correction, 0 .. 1;
-    output: file or folder of the result [``compensated/<same name>``]; report: folder of the reports [beside it];
-    config_dat: the controller's ``$config.dat``; tare: subtract the mean of a force CSV in air from its readings;
-    no_insert: insert no motions; shared_points: what happens to a named point that several motions use; strict: treat
-    warnings as errors; dry_run: write nothing; allow_compensated: accept a program that is compensated already.
+    force: True for the forces that belong to the program, or ``"0,360,560@base"`` (N, N m), or three or six numbers
+    as ``(0, 360, 560)`` in axes of the base, or a CSV; cell: instead of the nearest ``cell.yaml``; robot: name or
+    file, instead of the cell's; gain: share of the correction, 0 .. 1; output: file or folder of the result
+    [``compensated/<same name>``]; report: folder of the reports [beside it]; config_dat: the controller's
+    ``$config.dat``; tare: subtract the mean of a force CSV in air from its readings; no_insert: insert no motions;
+    shared_points: what happens to a named point that several motions use; strict: treat warnings as errors; dry_run:
+    write nothing; allow_compensated: accept a program that is compensated already.
 
     >>> import postproc
     >>> report = postproc.compensate("samples/kr270_taught/taught.src", force=True, output="out/taught.src")
@@ -134,7 +133,7 @@ def compensate(
 def predict(
     path: PathLike,
     *,
-    force: bool | str = False,
+    force: Force = False,
     cell: PathLike | None = None,
     robot: str | None = None,
     report: PathLike | None = None,
@@ -179,7 +178,7 @@ def verify(
     original: PathLike,
     compensated: PathLike,
     *,
-    force: bool | str = False,
+    force: Force = False,
     cell: PathLike | None = None,
     robot: str | None = None,
     step_mm: float = 4.0,
@@ -244,7 +243,7 @@ def learn(
     path: PathLike,
     measured: PathLike | Sequence[PathLike],
     *,
-    force: bool | str = True,
+    force: Force = True,
     cell: PathLike | None = None,
     robot: str | None = None,
     gain: float = 1.0,
@@ -299,7 +298,7 @@ def learn(
 def batch(
     jobs: PathLike | Sequence[PathLike],
     *,
-    force: bool | str | None = None,
+    force: Force | None = None,
     cell: PathLike | None = None,
     robot: str | None = None,
     gain: float | None = None,
@@ -346,7 +345,7 @@ def batch(
 
 
 def _share(gain: float) -> float:
-    if not 0.0 <= gain <= 1.0:
+    if not isinstance(gain, (int, float)) or not 0.0 <= gain <= 1.0:
         raise ValueError(f"gain must be a share of the correction, 0 .. 1, and is {gain!r}")
     return gain
 

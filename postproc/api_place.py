@@ -12,13 +12,16 @@ from postproc.report.assignment import PartAssignment
 from postproc.report.placement import Placement
 
 PathLike: TypeAlias = str | os.PathLike[str]
+Force: TypeAlias = bool | str | os.PathLike[str] | Sequence[float]
+"""True: those that belong to the program; a wrench as text or as three or six numbers [N, N m]; a file."""
+
 PlaceRange: TypeAlias = tuple[float, float] | None
 
 
 def place(
     paths: PathLike | Sequence[PathLike],
     *,
-    force: bool | str = False,
+    force: Force = False,
     x: PlaceRange = None,
     y: PlaceRange = None,
     z: PlaceRange = None,
@@ -96,7 +99,7 @@ def assign(
     paths: Sequence[PathLike],
     places: Mapping[str, Sequence[float]],
     *,
-    force: bool | str = False,
+    force: Force = False,
     objective: Literal["across", "max", "p95", "uncertainty"] = "across",
     limit_margin: float = 5.0,
     singularity_margin: float = 5.0,
@@ -141,13 +144,27 @@ def assign(
     return run(AssignRequest(common, stated, as_path(cells)))
 
 
-def stated_force(force: bool | str) -> str | None:
-    """As ``Request`` has it.  Raises ValueError where it is empty."""
-    if isinstance(force, str):
-        if not force.strip():
+def stated_force(force: Force) -> str | None:
+    """As ``Request`` has it.  Raises ValueError where it is empty, TypeError where it is nothing that states a force."""
+    if force is False or force is None:
+        return None
+    if force is True:
+        return ""
+    if isinstance(force, (str, os.PathLike)):
+        text = str(force)
+        if not text.strip():
             raise ValueError("force is empty; use True for the forces that belong to the program")
-        return force
-    return "" if force else None
+        return text
+    try:
+        numbers = [str(float(number)) for number in force]
+    except (TypeError, ValueError):
+        numbers = []
+    if not numbers:
+        message = (
+            f"force is {force!r:.40}; use True, '0,360,560@base', three or six numbers [N, N m], or a CSV"
+        )
+        raise TypeError(message)
+    return ",".join(numbers)
 
 
 def as_path(path: PathLike | None) -> Path | None:

@@ -9,10 +9,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import postproc
 from postproc import api
+from postproc.api_place import stated_force
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -149,3 +151,24 @@ def test_engagement_from_python():
     assert table["removal_mm3"].sum() == pytest.approx(engaged.removal)
     assert {"air", "cut"} <= set(table["state"])
     assert "removal_mm3" in repr(engaged)
+
+
+@pytest.mark.parametrize(
+    "force", [(100, 50, -80), np.array([100.0, 50.0, -80.0]), [100.0, 50.0, -80.0, 0, 0, 0]]
+)
+def test_a_force_in_numbers_is_that_force(force):
+    assert as_word(force) == as_word("100,50,-80")
+
+
+def as_word(force):
+    """What the run takes for the force, without a frame."""
+    numbers = [float(word) for word in stated_force(force).split(",")]
+    return numbers + [0.0] * (6 - len(numbers))
+
+
+@pytest.mark.parametrize("force", [[], {}, 100, 1.0, ["a"], [[1, 2, 3]], object()])
+def test_what_states_no_force_is_refused(force):
+    with pytest.raises(TypeError, match="three or six numbers"):
+        stated_force(force)
+    assert stated_force(False) is None
+    assert stated_force(True) == ""
