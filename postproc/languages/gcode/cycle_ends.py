@@ -100,7 +100,9 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
     number = np.arange(n)[:, None]
     latest = np.maximum.accumulate(np.where(placed, number, -1), axis=0)
     # A difference, or what is not read, says where the tool is as well, and not at which coordinate.
-    moved = given.motion[:, None] & (hows >= 0) & ~placed & ~(cycle[:, None] & (axis[:, None] == np.arange(3)))
+    moved = (
+        given.motion[:, None] & (hows >= 0) & ~placed & ~(cycle[:, None] & (axis[:, None] == np.arange(3)))
+    )
     loose = np.maximum.accumulate(np.where(moved, number, -1), axis=0)
     uncertain = np.cumsum(anywhere)
     lost = np.cumsum(leaves_unknown(given, lengths) | anywhere)

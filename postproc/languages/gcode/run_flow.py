@@ -176,8 +176,8 @@ class RunFlow(RunCalls):
         return inside if holds else behind
 
     def leaves_oddly(self, around: Construct, verb: Verb) -> bool:
-        """Whether LinuxCNC may not do what a BREAK or CONTINUE says: it has none of a REPEAT, and behind a CONTINUE of a
-        DO it goes on with a WHILE that a BREAK should end."""
+        """Whether LinuxCNC may not do what a BREAK or CONTINUE says: it has none of a REPEAT, and behind a CONTINUE of
+        a DO it goes on with a WHILE that a BREAK should end."""
         return around.verb == Verb.REPEAT or (
             around.verb == Verb.WHILE and verb == Verb.BREAK and self.continues_do
         )

@@ -13,6 +13,7 @@ from postproc.languages.krl.block_flow import BlockFlow
 from postproc.languages.krl.expressions import Value, index_text
 from postproc.languages.krl.external_axes import apart
 from postproc.languages.krl.flow_frames import BlockFrame, LabelHead, Restart
+from postproc.languages.krl.later_changes import EVENTS
 from postproc.languages.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, split_values
 from postproc.languages.krl.modal_state import ELSEWHERE, TRIGGERED, ModalState
 from postproc.languages.krl.other_modules import RoutineExit, take_exit
@@ -377,7 +378,7 @@ class Calls(BlockFlow):
                     one.name
                     for one in run.survey.routines.values()
                     if any(
-                        isinstance(item, Statement) and item.word in (b"INTERRUPT", b"TRIGGER", b"GLOBAL")
+                        isinstance(item, Statement) and item.word in EVENTS
                         for item in run.code[one.start : one.end + 1]
                     )
                 ),

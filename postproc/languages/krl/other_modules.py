@@ -16,12 +16,18 @@ from postproc.languages.krl.data import (
     read_data,
     read_references,
 )
+from postproc.languages.krl.later_changes import parameters_of
 from postproc.languages.krl.lexing import Statement
 from postproc.languages.krl.modal_state import ELSEWHERE, START, FrameIndex, FrameRegister, ModalState
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.predecessors import expanded
 from postproc.languages.krl.program_blocks import Routine
-from postproc.languages.krl.program_structure import ProgramStructure, closure, program_structure
+from postproc.languages.krl.program_structure import (
+    ProgramStructure,
+    closure,
+    program_structure,
+    spread_later,
+)
 from postproc.languages.krl.scan import scan
 from postproc.languages.krl.statement_effects import Effects, is_harmless
 from postproc.languages.krl.target import UnknownValue
@@ -117,11 +123,23 @@ class OtherModules:
         survey.table_entries |= self.table_entries
         later = survey.later.union(*(module.shared_later for module, _ in self.routines.values()))
         survey.later |= later - own
+        self._share_parameters(survey)
         for module, _ in self.routines.values():
             module.survey.table_entries |= survey.table_entries
             for name in module.survey.later & self.effects.keys():
                 module.survey.later_effects |= {one for one in self.effects[name] if isinstance(one, str)}
             module.survey.later |= later - module.declarations.types.keys() | module.shared_later
+
+    def _share_parameters(self, survey: ProgramStructure) -> None:
+        """Takes up what changes later because it is handed over to another module."""
+        parameters = parameters_of({name: routine for name, (_, routine) in self.routines.items()})
+        for module, routine in self.routines.values():
+            survey.later |= module.survey.later & {name for name, _ in routine.parameters}
+        spread_later(survey, parameters)
+        for module, routine in self.routines.values():
+            module.survey.later |= survey.later & {name for name, _ in routine.parameters}
+        for module in dict.fromkeys(module for module, _ in self.routines.values()):
+            spread_later(module.survey, parameters)
 
     def directions(self) -> dict[bytes, tuple[bool, ...]]:
         """Name of a routine -> of each parameter whether it comes back changed."""

@@ -15,6 +15,7 @@ from postproc.languages.krl.execution_context import Flow
 from postproc.languages.krl.expressions import Value
 from postproc.languages.krl.external_axes import by_themselves
 from postproc.languages.krl.flow_frames import Restart, Unfollowed
+from postproc.languages.krl.later_changes import EVENTS, later_actions, later_functions
 from postproc.languages.krl.lexing import (
     Assignment,
     Call,
@@ -43,8 +44,14 @@ from postproc.languages.krl.other_modules import (
     visible,
 )
 from postproc.languages.krl.program_blocks import Routine
-from postproc.languages.krl.program_structure import INLINE, LATER, closure
-from postproc.languages.krl.statement_effects import EVERYTHING, HIDDEN, effects_of, effects_of_unknown
+from postproc.languages.krl.program_structure import INLINE, closure
+from postproc.languages.krl.statement_effects import (
+    EVERYTHING,
+    HIDDEN,
+    called_in,
+    effects_of,
+    effects_of_unknown,
+)
 from postproc.languages.krl.vectorised import Item, VectorisedLines
 from postproc.toolpath import Annotation
 
@@ -253,7 +260,7 @@ class ProgramFlow(Calls):
             run.state.feed = NAN  # the block takes a time
         elif kind == "other" and run.survey.has_routine and HIDDEN.search(item.code):
             motions.unknown_motion(run, item)
-        elif item.word in (b"TRIGGER", b"INTERRUPT", b"GLOBAL"):
+        elif item.word in EVENTS:
             if item.word == b"TRIGGER":
                 run.state.no_insert = TRIGGERED
             self._later(item)
@@ -317,11 +324,10 @@ class ProgramFlow(Calls):
         """Takes up what an interrupt or a trigger may do from here on."""
         run = self.run
         run.expect_later(run.survey.later_effects, item.line)
-        for name, _ in LATER.findall(item.code):
-            name = name.upper()
-            if name == b"BAS" or name in run.survey.routines:
-                continue
-            if name + b"(" in item.code.upper().replace(b" ", b""):
+        called = called_in(item.code)
+        named = [one.name for one in later_actions(item) if one.name in called]
+        for name in (*named, *later_functions(item.code)):
+            if name != b"BAS" and name not in run.survey.routines:
                 self._unread(item, name)
 
     def _report_letters(self, item: Statement) -> None:
