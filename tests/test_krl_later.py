@@ -156,3 +156,15 @@ def test_a_function_that_only_an_interrupt_calls_is_reported_where_it_is_not_rea
         isr="DEF isr(v:IN)\nEND\n",
     )
     assert any(one.code == "KRL010" and "AWAY" in one.message.upper() for one in found.findings)
+
+
+@pytest.mark.parametrize("given", ["P.X", "r,r"])
+def test_what_another_module_leaves_is_not_claimed_where_it_has_two_names_for_a_variable(given: str) -> None:
+    """Of the position that it leaves the next motion inherits."""
+    start = HEAD.replace("DECL FRAME Q\n", "DECL REAL r\n")
+    text = f"{start}r=7\nsub({given})\nLIN {{Y 5}}\nEND\n"
+    move = "LIN P\n" if given == "P.X" else "LIN {X v,Y 2,Z 3,A 4,B 5,C 6}\n"
+    body = f"DEF sub(v:OUT,w:OUT)\nREAL v,w\nv=3\nw=9\n{move}END\n"
+    assert not read(text, sub=body).toolpath.known[-1]
+    apart = text.replace("sub(P.X)", "sub(r)").replace("sub(r,r)", "sub(r,3)")
+    assert read(apart, sub=body).toolpath.known[-1]

@@ -371,4 +371,50 @@ MISREADINGS = (
             inputs=({1: (True,)}, {1: (True, True)}),
         ),
     ),
+    Misreading(
+        "a parameter that is set in a loop",
+        "A subprogram sets its base, and then a parameter for which a component of the base was handed over: motions"
+        " behind are said to stand in the base that it set.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "sub($BASE.Z)\n"
+            "END\n"
+            "DEF sub(w:OUT)\n"
+            "DECL INT i\n"
+            "BAS(#BASE,2)\n"
+            "BAS(#TOOL,1)\n"
+            "FOR i=1 TO 2\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "inner(w)\n"
+            "ENDFOR\n"
+            "END\n"
+            "DEF inner(u:OUT)\n"
+            "BAS(#BASE,3)\n"
+            "u=7\n"
+            "LIN {X 2,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n"
+        ),
+    ),
+    Misreading(
+        "a variable under two names",
+        "A subprogram sets a variable of the module, and then the parameter for which it was handed over: what it knows"
+        " by its own name is said to be as it was set.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "sub(mr)\n"
+            "END\n"
+            "DEF sub(w:OUT)\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "mr=5\n"
+            "w=9\n"
+            "LIN {X mr,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n",
+            dat="DEFDAT part\nDECL REAL mr=1\nENDDAT\n",
+        ),
+    ),
 )

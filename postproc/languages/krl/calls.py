@@ -394,8 +394,9 @@ class Calls(BlockFlow):
         run.state.stop = max(run.state.stop, Waits.MAYBE)
         returned = returned_by(said, run.survey.directions)
         self._after_other(item, said.name, returned)
-        if any(isinstance(effect, str) for effect in returned):
-            return  # a parameter that is a variable of the controller
+        own = {*(run.routine.types if run.routine is not None else ()), *run.declarations.types}
+        if not run.others.stay_apart(said, returned - (own - run.declarations.shared)):
+            return
         if run.state.ended_later:
             why = f"after the call of {shown(said.name)} in line {item.line}"
             self._end_anywhere(set(), why)

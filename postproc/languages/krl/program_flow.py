@@ -48,9 +48,12 @@ from postproc.languages.krl.program_structure import INLINE, closure
 from postproc.languages.krl.statement_effects import (
     EVERYTHING,
     HIDDEN,
+    Effect,
+    as_effects,
     called_in,
     effects_of,
     effects_of_unknown,
+    functions_of,
 )
 from postproc.languages.krl.vectorised import Item, VectorisedLines
 from postproc.toolpath import Annotation
@@ -207,6 +210,8 @@ class ProgramFlow(Calls):
             return pc + 1
         if item.comment:
             self._comment(item)
+        if run.walked and run.survey.aliases:
+            self._forget_aliases(item)
         kind, said = item.kind, item.strings
         if kind == "comment":
             return pc + 1
@@ -265,6 +270,17 @@ class ProgramFlow(Calls):
                 run.state.no_insert = TRIGGERED
             self._later(item)
         return pc + 1
+
+    def _forget_aliases(self, item: Statement) -> None:
+        """In a routine of whose callers nothing is known: what else a statement changes may have been handed over."""
+        run = self.run
+        changed = effects_of(item, run.survey.directions)[0]
+        if functions_of(item):
+            changed = changed | as_effects(identifiers(item.code))
+        same = changed & run.survey.aliases.keys()
+        if same:
+            others = frozenset[Effect]().union(*(run.survey.aliases[effect] for effect in same)) - changed
+            run.forget(set(others), f"as it may be what line {item.line} changes")
 
     def _advance_run(self, pc: int, item: Statement) -> None:
         """Takes up whether the advance run stops at a statement."""

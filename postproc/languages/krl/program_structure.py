@@ -7,15 +7,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from postproc.languages.krl.later_changes import (
-    EVENTS,
-    Handed,
-    Parameters,
-    later_actions,
-    later_functions,
-    parameters_of,
-    spread,
-)
+from postproc.languages.krl.aliases import Handed, Parameters, parameters_of, spread
+from postproc.languages.krl.later_changes import EVENTS, later_actions, later_functions
 from postproc.languages.krl.lexing import (
     BRANCHES,
     CLOSES,
@@ -78,7 +71,8 @@ class ProgramStructure:
     start of the routine and name of every label that a GOTO names -> first and last index of these;
     ``effects``: all that the program changes anywhere; ``blocks``: all of them; ``ill_formed``: the code of statements
     with words that have no meaning there; ``directions``: name of a routine ->
-    of each parameter whether it comes back changed; ``handed``: what calls hand over.
+    of each parameter whether it comes back changed; ``handed``: what calls hand over;
+    ``aliases``: effect -> what else may be the same variable in a routine of whose callers nothing is known.
     """
 
     events: dict[int, list[tuple[str, Block]]] = field(default_factory=dict)
@@ -97,6 +91,7 @@ class ProgramStructure:
     unclosed: list[tuple[int, str]] = field(default_factory=list)
     directions: dict[bytes, tuple[bool, ...]] = field(default_factory=dict)
     handed: set[Handed] = field(default_factory=set)
+    aliases: dict[Effect, frozenset[Effect]] = field(default_factory=dict)
 
     @property
     def has_routine(self) -> bool:
