@@ -60,6 +60,8 @@ from postproc.toolpath import Annotation
 
 _ANNOTATION = re.compile(rb";[ \t]*(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
 
+_WAITS = tuple(Waits)
+
 
 class ProgramFlow(Calls):
     """Goes over a program line by line, along all of its paths; ``all`` once."""
@@ -288,7 +290,11 @@ class ProgramFlow(Calls):
         ahead = advance_of(item)
         if ahead is not None:
             state.no_advance = ahead
-        state.stop = max(state.stop, stop_of(item, self._is_continued(pc), self.run.type_of))
+        if state.stop is Waits.YES:
+            return
+        if not self.stops[pc]:  # it is the same each time: the types of a routine's names do not change
+            self.stops[pc] = 1 + stop_of(item, self._is_continued(pc), self.run.type_of)
+        state.stop = max(state.stop, _WAITS[self.stops[pc] - 1])
 
     def _is_continued(self, pc: int) -> bool:
         """Whether a CONTINUE is before a statement."""
