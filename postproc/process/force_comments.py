@@ -66,7 +66,9 @@ def _jumps(stated: StatedForces, toolpath: Toolpath, file: str) -> list[Finding]
         return []
     line = int(toolpath.line[lost[0]])
     more = f" (and {len(lost) - 1} more)" if len(lost) > 1 else ""
-    what = f"line {line} is a point-to-point motion under a FORCE comment: it is taken as air and not corrected"
+    what = (
+        f"line {line} is a point-to-point motion under a FORCE comment: it is taken as air and not corrected"
+    )
     help = "write a straight line (LIN, MoveL, L) where it cuts, and FORCE OFF before it where it does not"
     return [Finding("FRC009", what + more, file, line, help=help)]
 
