@@ -28,7 +28,6 @@ from postproc.languages.krl.lexing import FRAME_TABLES, Head, Statement, lines, 
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.open_blocks import BUDGET
 from postproc.languages.krl.other_modules import is_module, read_modules, visible
-from postproc.languages.krl.program_blocks import Routine
 from postproc.languages.krl.program_flow import ProgramFlow
 from postproc.languages.krl.program_structure import ProgramStructure, program_structure
 from postproc.languages.krl.scan import scan
@@ -91,7 +90,7 @@ def read(
         _statements(code), effects, {**others.directions(), **dict(_directions(code))}
     )
     others.share(surveyed, declarations.types.keys() - declarations.shared)
-    _share_names(surveyed)
+    surveyed.aliases = aliases(surveyed.handed, parameters_of(surveyed.routines))
     read = (*documents, *references, *siblings)
     has_tcp = any(_TCP.search(document.raw) for document in read)
     has_turning = any(_TURNING.search(document.raw) for document in read)
@@ -137,16 +136,6 @@ def read(
         names=tuple(_names(documents)),
         unresolved=unresolved,
     )
-
-
-def _share_names(survey: ProgramStructure) -> None:
-    """Notes which names may be one variable in a subprogram, and what its blocks change by that."""
-    survey.aliases = aliases(survey.handed, parameters_of(survey.routines))
-    is_main = True
-    for block in survey.blocks if survey.aliases else ():
-        is_main = block.is_main if isinstance(block, Routine) else is_main
-        if not is_main:
-            block.effects.update(*(survey.aliases.get(effect, ()) for effect in tuple(block.effects)))
 
 
 def _directions(code: Sequence[Item]) -> Iterator[tuple[bytes, tuple[bool, ...]]]:
