@@ -486,6 +486,18 @@ def test_annotations_are_modal_from_their_row_on():
     assert np.allclose(result.values[:, 0], [1, 1, 2, 2])
 
 
+def test_point_to_point_motions_that_a_comment_gives_a_force_are_told():
+    kinds = [Kind.PTP, Kind.LIN, Kind.PTP, Kind.AXIS, Kind.LIN, Kind.PTP, Kind.PTP, Kind.PTP]
+    notes = [(1, "FORCE 1 0 0", 5), (5, "FORCE OFF", 6), (6, "FORCE 0 0 0", 7)]
+    path = path_of([[0, 0.1 * (-1) ** i, 0] for i in range(8)], kinds, notes=notes)
+    (finding,) = run(path, "").findings
+    assert (finding.code, finding.line) == ("FRC009", 12)
+    assert "(and 1 more)" in finding.message
+    cell = cell_of()
+    rapids = wrenches(Path("part.ngc"), path, frames_of(cell, path, Path("part.ngc")), cell, "", rapids=True)
+    assert not rapids.findings
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

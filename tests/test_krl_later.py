@@ -133,3 +133,38 @@ def test_what_a_routine_that_is_not_followed_starts_goes_on(when: str, inner: st
     refused = program.toolpath.constraints.refused
     assert after in refused
     assert "may change base or tool at any time" in refused[after].message
+
+
+@pytest.mark.parametrize("by", ["a call", "a function"])
+def test_what_another_module_changes_of_its_parameter_later_is_not_claimed(by: str) -> None:
+    call, kind, end = {
+        "a call": ("sub(r)", "DEF", "END"),
+        "a function": ("r=sub(r)", "DEFFCT REAL", "ENDFCT"),
+    }[by]
+    head = HEAD.replace("DECL FRAME Q\n", "DECL REAL r\n") + f"r=7\n{call}\nr=7\n"
+    text = f"{head}LIN {{X r,Y 2,Z 3,A 4,B 5,C 6}}\nEND\n"
+    trigger = "TRIGGER WHEN DISTANCE=0 DELAY=0 DO w=9\n"
+    later = read(text, sub=f"{kind} sub(w:OUT)\n{trigger}RETURN 1\n{end}\n")
+    at_once = read(text, sub=f"{kind} sub(w:OUT)\nw=9\nRETURN 1\n{end}\n")
+    assert not later.toolpath.known[0]
+    assert at_once.toolpath.known[0]
+
+
+def test_a_function_that_only_an_interrupt_calls_is_reported_where_it_is_not_read() -> None:
+    found = read(
+        f"{HEAD}INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO isr(away(2))\nINTERRUPT ON 3\nLIN {FULL}\nEND\n",
+        isr="DEF isr(v:IN)\nEND\n",
+    )
+    assert any(one.code == "KRL010" and "AWAY" in one.message.upper() for one in found.findings)
+
+
+@pytest.mark.parametrize("given", ["P.X", "r,r"])
+def test_what_another_module_leaves_is_not_claimed_where_it_has_two_names_for_a_variable(given: str) -> None:
+    """Of the position that it leaves the next motion inherits."""
+    start = HEAD.replace("DECL FRAME Q\n", "DECL REAL r\n")
+    text = f"{start}r=7\nsub({given})\nLIN {{Y 5}}\nEND\n"
+    move = "LIN P\n" if given == "P.X" else "LIN {X v,Y 2,Z 3,A 4,B 5,C 6}\n"
+    body = f"DEF sub(v:OUT,w:OUT)\nREAL v,w\nv=3\nw=9\n{move}END\n"
+    assert not read(text, sub=body).toolpath.known[-1]
+    apart = text.replace("sub(P.X)", "sub(r)").replace("sub(r,r)", "sub(r,3)")
+    assert read(apart, sub=body).toolpath.known[-1]

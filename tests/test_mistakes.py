@@ -87,6 +87,13 @@ MISTAKES = [
     Mistake("letter in a number", [before_cut(";FORCE 0 36O 560")], [P, "--force"], 1, ["part.src:10", "'36O'"]),
     Mistake("unit in a number", [before_cut(";FORCE 0N 360N 560N")], [P, "--force"], 1, ["'0N'"]),
     Mistake("words instead of one", [], [P, "--force", "0", "360", "560"], 2, ["force is one word"]),
+    Mistake(
+        "a PTP under a force",
+        [program(" ; slot", " ; slot\r\nPTP {X 200.000,Y 80.000,Z -2.000,A 0.000,B 0.000,C 180.000}")],
+        [P, "--force", "--dry-run"],
+        3,
+        ["FRC009", "line 12", "point-to-point", "FORCE OFF before it"],
+    ),
     Mistake("frame apart", [], [P, "--force", FORCE, "@base"], 2, ["force is one word"]),
     Mistake("frame misspelt", [], [P, f"--force={FORCE}@bse"], 1, ["did you mean 'base'"]),
     Mistake("two numbers", [], [P, "--force=0,360"], 1, ["2 numbers", "3 or 6"]),

@@ -96,8 +96,8 @@ FORCE_CODES = define(
             "force on an air move",
             meaning="PTP and G0 are air moves by definition; the force for them is ignored.",
             consequence="If the motion cuts, it is not corrected.",
-            action="Remove the row, or program the motion as LIN or G1.",
-            example="A CSV row for the line of a PTP.",
+            action="Remove the row, or write FORCE OFF before the motion; program it as LIN or G1 if it cuts.",
+            example="A CSV row for the line of a PTP, or a PTP between FORCE and FORCE OFF.",
         ),
         "FRC010": Code(
             "info",

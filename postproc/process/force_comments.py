@@ -14,6 +14,7 @@ import numpy as np
 from postproc.base.arrays import Bools, Ints
 from postproc.base.findings import Finding, Refusal
 from postproc.process.stated_forces import BASE, NotAForce, StatedForces, is_number_like, parse_force
+from postproc.process.wrenches import is_air
 from postproc.toolpath import Annotation, Toolpath
 
 FORM = "write FORCE fx fy fz [mx my mz] [@base|world|tool|feed] in N and N m, or FORCE OFF"
@@ -23,10 +24,13 @@ _REST = re.compile(r"force(?=[\s,@]|\Z)[\s,]*", re.IGNORECASE)
 _OFF = ((0.0,) * 6, BASE)
 
 
-def read_annotations(toolpath: Toolpath, file: str) -> tuple[StatedForces | None, tuple[Finding, ...]]:
+def read_annotations(
+    toolpath: Toolpath, file: str, rapids: bool = False
+) -> tuple[StatedForces | None, tuple[Finding, ...]]:
     """What the FORCE comments state for every motion; None where there is none.
 
-    Comments that only start with FORCE are reported (FRC006).  Refusal FRC002 for every malformed one.
+    Comments that only start with FORCE are reported (FRC006), and motions that are air whatever their force (FRC009),
+    unless these are ``rapids`` (G0), with which nobody cuts.  Refusal FRC002 for every malformed one.
     """
     rows, forces = [], []
     ignored, wrong = [], []
@@ -51,7 +55,22 @@ def read_annotations(toolpath: Toolpath, file: str) -> tuple[StatedForces | None
         return None, tuple(ignored)
     values = np.array([_OFF[0], *(value for value, _ in forces)])
     frames = np.array([_OFF[1], *(frame for _, frame in forces)])
-    return StatedForces(values, frames, latest(rows, len(toolpath))), tuple(ignored)
+    stated = StatedForces(values, frames, latest(rows, len(toolpath)))
+    return stated, (*ignored, *([] if rapids else _jumps(stated, toolpath, file)))
+
+
+def _jumps(stated: StatedForces, toolpath: Toolpath, file: str) -> list[Finding]:
+    """The point-to-point motions for which a comment states a force, as one finding."""
+    lost = np.flatnonzero(stated.acts & is_air(toolpath))
+    if not len(lost):
+        return []
+    line = int(toolpath.line[lost[0]])
+    more = f" (and {len(lost) - 1} more)" if len(lost) > 1 else ""
+    what = (
+        f"line {line} is a point-to-point motion under a FORCE comment: it is taken as air and not corrected"
+    )
+    help = "write a straight line (LIN, MoveL, L) where it cuts, and FORCE OFF before it where it does not"
+    return [Finding("FRC009", what + more, file, line, help=help)]
 
 
 def marked_air(toolpath: Toolpath) -> Bools:

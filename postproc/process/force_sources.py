@@ -39,15 +39,17 @@ def wrenches(
     cell: Cell,
     spec: str | None,
     offset: bool = False,
+    rapids: bool = False,
 ) -> Wrenches:
     """The wrench of every motion of ``toolpath``.
 
     spec: None = no --force (zero); '' = --force alone (the program's own: FORCE comments, then
     ``<stem>.force.csv`` beside it, then the cell's ``force`` or ``process``); else the value of --force, a path
-    in it relative to the working folder.  ``offset``: a log's mean in air is taken off.  Refusal FRC001 to FRC005,
+    in it relative to the working folder.  ``offset``: a log's mean in air is taken off.  ``rapids``: its point-to-point
+    motions are such as nobody cuts with (G0).  Refusal FRC001 to FRC005,
     FRC020, and those of a force CSV or a process file.
     """
-    given = _Given(program, toolpath, frames, offset)
+    given = _Given(program, toolpath, frames, offset, rapids)
     if spec is None:
         given.no_offset("there is no --force")
         return Wrenches.zero(len(toolpath))
@@ -99,6 +101,7 @@ class _Given:
     toolpath: Toolpath
     frames: MotionFrames
     offset: bool
+    rapids: bool
 
     def explicit(self, spec: str, folder: Path, file: str, line: int, name: str) -> SourcedForces:
         """A force given as text: a CSV or process file (relative to ``folder``), or one wrench for all motions."""
@@ -146,7 +149,7 @@ class _Given:
 def _belonging(given: _Given, cell: Cell) -> SourcedForces:
     """The force that belongs to the program, from the first source that exists."""
     program = given.program
-    stated, findings = read_annotations(given.toolpath, str(program))
+    stated, findings = read_annotations(given.toolpath, str(program), given.rapids)
     beside = program.with_name(program.stem + ".force.csv")
     if stated is not None:
         given.no_offset("the force comes from FORCE comments")

@@ -227,7 +227,8 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
     frames = frames_of(cell, path, request.program, external)
     base, tool, start = frames.base_in_robot, frames.tool_in_flange, _start(cell, robot)
     path, orientation_findings = as_run(path, base, tool, robot, start, str(request.program))
-    force = wrenches(request.program, path, frames, cell, request.force, request.tare)
+    rapids = dialect.family == "G-code"
+    force = wrenches(request.program, path, frames, cell, request.force, request.tare, rapids)
     force = factored(cell, force, path, base[np.arange(len(path))].rotation)
     if learned is not None:
         force = learned.forces(force)

@@ -83,6 +83,8 @@ class Flow(Settings):
         self.scope.forget()
         before = self.modes.copy()
         self.body(self.chance.randint(1, 4), self.maybe(0.6))
+        if self.loops and self.maybe(0.1):
+            self.leave(self.loops[-1])
         self.flow_line(f"{label} {self.key('endrepeat')}")
         self.after(before)
 
@@ -117,7 +119,9 @@ class Flow(Settings):
         before = self.modes.copy()
         self.put(f"#{counter}=[#{counter}+1]", plain=True)
         self.scope.set(counter, None)
+        self.loops.append(label)
         self.body(self.chance.randint(1, 4), self.maybe(0.6))
+        self.loops.pop()
         if self.maybe(0.15):
             self.leave(label)
         self.flow_line(f"{label} {self.key('while')} {test}" if do else f"{label} {self.key('endwhile')}")

@@ -20,7 +20,8 @@
     cycles     = (G73 | G81 | G82 | G83 | G85 | G86 | G87 | G88 | G89) {X Y Z} R [L] [Q] [P] [G98 | G99] {more holes}
                  (G80 | a motion), in any plane, absolute or incremental
     assignment = "#" name "=" real, of values that later words use, parameters of the control (#5420, #<_x>) among them
-    flow       = o if/elseif/else/endif | o while/endwhile | o do/while | o repeat/endrepeat, break and continue in them
+    flow       = o if/elseif/else/endif | o while/endwhile | o do/while | o repeat/endrepeat; break and continue in
+                 them, and of the loop around a repeat in it
     sub        = o sub ... [o return [real]] o endsub [real] | O number ... M99
     call       = o call {[real]} | M98 P [L]
     saved      = M70 | M72 | M73 | M71;  noise = F | S | M codes | comments of both kinds | G4

@@ -23,6 +23,17 @@ MISREADINGS = {
     + "#20=0\no1 while [0]\no1 break\no1 endwhile\no2 do\n#20=[#20+1]\nG1 X5\no2 while [#20 lt 3]\nM2",
     "a CONTINUE after which nothing is known": START
     + "#20=0\no1 while [#20 lt 4]\n/#20=[#20+1]\n#20=[#20+1]\nG0 X9\no1 continue\no1 endwhile\nM2",
+    "a difference before a canned cycle": START + "M3\nG98 G81 X1 Y2 Z-9 R5\nG1 Z40\nG91 Z-38\nG90\n"
+    "G87 R9 Z-3 I2 J2 K-6\nG1 X8\nZ1\nM2",
+    "an expression before a canned cycle": START + "#1=[#5420-21]\nG1 Z40\nZ#1\nG98 G81 X5 Z-30 R-7\n"
+    "G80\nG1 X8\nZ1\nX4\nM2",
+    "a REPEAT behind a CONTINUE of a DO": START + "#20=0\no1 do\n#20=[#20+1]\no2 repeat [3]\nG91 G0 X1\nG90\n"
+    "o2 endrepeat\no1 continue\no1 while [#20 lt 3]\nM2",
+    "a REPEAT that is left from within": START
+    + "#20=0\n#7=0\no1 while [#20 lt 3]\n#20=[#20+1]\no2 repeat [2]\n"
+    "#7=[#7+1]\nG0 X#7\no1 continue\no2 endrepeat\no1 endwhile\nM2",
+    "a BREAK of a WHILE behind a CONTINUE of a DO": START + "#20=0\n#7=0\no1 do\n#20=[#20+1]\no1 continue\n"
+    "o1 while [#20 lt 2]\n#21=0\no2 while [#21 lt 3]\n#21=[#21+1]\n#7=[#7+1]\nG0 X#7\no2 break\no2 endwhile\nM2",
     "the centre of an arc in a mode that is not known": START + "/G90.1\nG1 X10 Y10\nG3 I-10 J-10\nM2",
 }
 

@@ -119,6 +119,7 @@ class Spelling:
         self.label = self.chance.randint(1, 900)
         self.subs: list[tuple[str, int, Modes | None]] = []
         self.late = False
+        self.loops: list[str] = []
         self.depth = 0
         self.bound = self.chance.choice((8, 15, 25, 40, 58))
 

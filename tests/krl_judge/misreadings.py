@@ -309,4 +309,112 @@ MISREADINGS = (
             inputs=({1: (True,)},),
         ),
     ),
+    Misreading(
+        "what an event is handed",
+        "An interrupt calls a function for what it hands over: the frame that this sets is said not to change.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "INTERRUPT DECL 3 WHEN $IN[1] DO ir(twice(4))\n"
+            "INTERRUPT ON 3\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "LIN {X 2,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n"
+            "DEF ir(v:IN)\n"
+            "END\n"
+            "DEFFCT INT twice(v:IN)\n"
+            "BAS(#BASE,2)\n"
+            "RETURN 2*v\n"
+            "ENDFCT\n",
+            inputs=({1: (True,)},),
+        ),
+    ),
+    Misreading(
+        "a parameter that changes later",
+        "A trigger of a subprogram sets a parameter, when that has returned: the variable that was handed over for it"
+        " is said to keep its value.",
+        Case(
+            "DEF part()\n"
+            "DECL REAL r\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "r=7\n"
+            "sub(r)\n"
+            "LIN {X r,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n"
+            "DEF sub(w:OUT)\n"
+            "TRIGGER WHEN PATH=0 DELAY=0 DO inner(w) PRIO=-1\n"
+            "END\n"
+            "DEF inner(u:OUT)\n"
+            "u=9\n"
+            "END\n",
+            inputs=({1: (True,)}, {}),
+        ),
+    ),
+    Misreading(
+        "a variable that changes under its parameter",
+        "A trigger sets a variable while a subprogram has it as its parameter.",
+        Case(
+            "DEF part()\n"
+            "DECL REAL r\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "TRIGGER WHEN PATH=0 DELAY=0 DO r=9\n"
+            "sub(r)\n"
+            "END\n"
+            "DEF sub(w:OUT)\n"
+            "w=7\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "LIN {X w,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n",
+            inputs=({1: (True,)}, {1: (True, True)}),
+        ),
+    ),
+    Misreading(
+        "a parameter that is set in a loop",
+        "A subprogram sets its base, and then a parameter for which a component of the base was handed over: motions"
+        " behind are said to stand in the base that it set.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "sub($BASE.Z)\n"
+            "END\n"
+            "DEF sub(w:OUT)\n"
+            "DECL INT i\n"
+            "BAS(#BASE,2)\n"
+            "BAS(#TOOL,1)\n"
+            "FOR i=1 TO 2\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "inner(w)\n"
+            "ENDFOR\n"
+            "END\n"
+            "DEF inner(u:OUT)\n"
+            "BAS(#BASE,3)\n"
+            "u=7\n"
+            "LIN {X 2,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n"
+        ),
+    ),
+    Misreading(
+        "a variable under two names",
+        "A subprogram sets a variable of the module, and then the parameter for which it was handed over: what it knows"
+        " by its own name is said to be as it was set.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "sub(mr)\n"
+            "END\n"
+            "DEF sub(w:OUT)\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "mr=5\n"
+            "w=9\n"
+            "LIN {X mr,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n",
+            dat="DEFDAT part\nDECL REAL mr=1\nENDDAT\n",
+        ),
+    ),
 )

@@ -97,7 +97,13 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
     # Of a cycle in a plane that is not known, neither is along which axis it works.
     anywhere = cycle & (given.modal.force[Group.PLANE] < 0)
     placed &= ~anywhere[:, None]
-    latest = np.maximum.accumulate(np.where(placed, np.arange(n)[:, None], -1), axis=0)
+    number = np.arange(n)[:, None]
+    latest = np.maximum.accumulate(np.where(placed, number, -1), axis=0)
+    # A difference, or what is not read, says where the tool is as well, and not at which coordinate.
+    moved = (
+        given.motion[:, None] & (hows >= 0) & ~placed & ~(cycle[:, None] & (axis[:, None] == np.arange(3)))
+    )
+    loose = np.maximum.accumulate(np.where(moved, number, -1), axis=0)
     uncertain = np.cumsum(anywhere)
     lost = np.cumsum(leaves_unknown(given, lengths) | anywhere)
     # A cycle that says nothing of R, G98, G99 and the frame ends as the one before it.
@@ -116,7 +122,7 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
             at, drill = latest[row, axis[row]], drilled[axis[row]]
             there = level[drill] if drill > at else height[at, axis[row]]
             at, origin = max(at, drill), _level_from(given, row, cycle, source)
-            same = at >= 0 and frame[at] == frame[row] and lost[at] == lost[row]
+            same = at > loose[row, axis[row]] and frame[at] == frame[row] and lost[at] == lost[row]
             at_r, before = np.nan, there if same else np.nan
         elif frame[row] != frame[last] or axis[row] != axis[last] or uncertain[row] != uncertain[last]:
             # LinuxCNC goes back to the number of the other axis

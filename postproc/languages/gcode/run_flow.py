@@ -109,6 +109,8 @@ class RunFlow(RunCalls):
         if verb == Verb.REPEAT_PART:
             return self.repeat_part(statement)
         assert around is not None
+        if verb in (Verb.BREAK, Verb.CONTINUE) and self.leaves_oddly(around, verb):
+            self.hide(around.start)
         if verb == Verb.RETURN:
             if not self.frames:
                 raise NotFollowed
@@ -150,7 +152,7 @@ class RunFlow(RunCalls):
             holds = self.value(around.text, around.start)
         elif around.verb == Verb.DO:
             # With the BREAK of a WHILE, even one that is passed over, LinuxCNC ends the next DO.
-            holds = 1.0 if ahead else math.nan if self.breaks_while else self.value(around.until, around.stop)
+            holds = 1.0 if ahead else math.nan if self.breaks_loop else self.value(around.until, around.stop)
         elif around.verb == Verb.LOOP:
             holds = 1.0
             if not ahead and around.until:
@@ -161,7 +163,7 @@ class RunFlow(RunCalls):
         else:
             if ahead:
                 count = self.value(around.text, around.start)
-                if math.isnan(count) or count != math.floor(count):
+                if math.isnan(count) or count != math.floor(count) or self.counts_on(around):
                     return self.maybe(around)
                 self.repeats[around.start] = int(count)
             left = self.repeats.get(around.start, 0)
@@ -172,6 +174,18 @@ class RunFlow(RunCalls):
                 self.hide(around.start)  # how often it runs is not known
             return self.maybe(around)
         return inside if holds else behind
+
+    def leaves_oddly(self, around: Construct, verb: Verb) -> bool:
+        """Whether LinuxCNC may not do what a BREAK or CONTINUE says: it has none of a REPEAT, and behind a CONTINUE of
+        a DO it goes on with a WHILE that a BREAK should end."""
+        return around.verb == Verb.REPEAT or (
+            around.verb == Verb.WHILE and verb == Verb.BREAK and self.continues_do
+        )
+
+    def counts_on(self, around: Construct) -> bool:
+        """Whether LinuxCNC may run a REPEAT another number of times than it states: behind a CONTINUE of a DO it counts
+        it anew at its end, and one that was left from within goes on with what was left of its count."""
+        return self.continues_do or self.repeats.get(around.start, -1) >= 0
 
     def counted(self, around: Construct, ahead: bool) -> float:
         """Whether a FOR runs its body again; its variable is set."""

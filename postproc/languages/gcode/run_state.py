@@ -89,11 +89,13 @@ class RunState:
         self.repeats: dict[int, int] = {}
         self.steps = 0
         self.missing: set[str] = set()  # names of what is called and not here
-        self.breaks_while = any(
-            statement.verb == Verb.BREAK and shape.construct[block].verb == Verb.WHILE
+        left = {
+            (statement.verb, shape.construct[block].verb)
             for block, statement in shape.statements.items()
             if block in shape.construct
-        )
+        }
+        self.breaks_loop = bool(left & {(Verb.BREAK, Verb.WHILE), (Verb.BREAK, Verb.REPEAT)})
+        self.continues_do = (Verb.CONTINUE, Verb.DO) in left
 
     def _codes(self) -> dict[int, str]:
         """Block -> what its M, G65 or L words do to the flow."""

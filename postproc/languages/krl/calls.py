@@ -13,6 +13,7 @@ from postproc.languages.krl.block_flow import BlockFlow
 from postproc.languages.krl.expressions import Value, index_text
 from postproc.languages.krl.external_axes import apart
 from postproc.languages.krl.flow_frames import BlockFrame, LabelHead, Restart
+from postproc.languages.krl.later_changes import EVENTS
 from postproc.languages.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, split_values
 from postproc.languages.krl.modal_state import ELSEWHERE, TRIGGERED, ModalState
 from postproc.languages.krl.other_modules import RoutineExit, take_exit
@@ -377,7 +378,7 @@ class Calls(BlockFlow):
                     one.name
                     for one in run.survey.routines.values()
                     if any(
-                        isinstance(item, Statement) and item.word in (b"INTERRUPT", b"TRIGGER", b"GLOBAL")
+                        isinstance(item, Statement) and item.word in EVENTS
                         for item in run.code[one.start : one.end + 1]
                     )
                 ),
@@ -393,8 +394,9 @@ class Calls(BlockFlow):
         run.state.stop = max(run.state.stop, Waits.MAYBE)
         returned = returned_by(said, run.survey.directions)
         self._after_other(item, said.name, returned)
-        if any(isinstance(effect, str) for effect in returned):
-            return  # a parameter that is a variable of the controller
+        own = {*(run.routine.types if run.routine is not None else ()), *run.declarations.types}
+        if not run.others.stay_apart(said, returned - (own - run.declarations.shared)):
+            return
         if run.state.ended_later:
             why = f"after the call of {shown(said.name)} in line {item.line}"
             self._end_anywhere(set(), why)

@@ -13,6 +13,7 @@ from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
 from postproc.base.memory import without_garbage_collection
 from postproc.languages.dialect import MARK, Program
+from postproc.languages.krl.aliases import aliases, parameters_of
 from postproc.languages.krl.controller_data import declared_frames, entry_of, start_with
 from postproc.languages.krl.data import (
     Declarations,
@@ -89,6 +90,7 @@ def read(
         _statements(code), effects, {**others.directions(), **dict(_directions(code))}
     )
     others.share(surveyed, declarations.types.keys() - declarations.shared)
+    surveyed.aliases = aliases(surveyed.handed, parameters_of(surveyed.routines))
     read = (*documents, *references, *siblings)
     has_tcp = any(_TCP.search(document.raw) for document in read)
     has_turning = any(_TURNING.search(document.raw) for document in read)

@@ -26,10 +26,10 @@ class OpenBlocks:
 
     reachable: some path leads here; else lines are passed over up to a place where one does.  stack: open blocks and
     calls; activations: routines that run; repeating, unsure: how many of the open blocks are loops and calls that are
-    followed, or are not followed.  seen: statements that ran in loops and calls; spent, spent_unsure: how often such
-    ones ran again, surely or maybe; jumped: a GOTO led back, so that every line may run again; shallow: where it is not
-    known that they run, loops and calls are not followed any more; steps, passes: statements that were gone over, and
-    how many may be.
+    followed, or are not followed. seen: statements that ran in loops and calls; stops: 1 + whether the advance run
+    stops at a statement, 0 where that was not asked; spent, spent_unsure: how often such ones ran again, surely or
+    maybe; jumped: a GOTO led back, so that every line may run again; shallow: where it is not known that they run,
+    loops and calls are not followed any more; steps, passes: statements that were gone over, and how many may be.
     """
 
     def __init__(self, run: ExecutionContext, unfollowed: Unfollowed) -> None:
@@ -41,6 +41,7 @@ class OpenBlocks:
         self.repeating = self.unsure = self.spent = self.spent_unsure = self.steps = 0
         self.most_steps = len(run.code) + MOST_STEPS
         self.seen = bytearray(len(run.code))
+        self.stops = bytearray(len(run.code))
         self.jumped = self.shallow = False
         self.text_called: set[bytes] = set()
         self.comments: dict[int, Annotation] = {}

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 from postproc.base.document import Document
+from postproc.languages.krl.aliases import parameters_of
 from postproc.languages.krl.data import (
     Declarations,
     at_the_start,
@@ -16,14 +17,19 @@ from postproc.languages.krl.data import (
     read_data,
     read_references,
 )
-from postproc.languages.krl.lexing import Statement
+from postproc.languages.krl.lexing import Call, Statement, split_values
 from postproc.languages.krl.modal_state import ELSEWHERE, START, FrameIndex, FrameRegister, ModalState
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.predecessors import expanded
 from postproc.languages.krl.program_blocks import Routine
-from postproc.languages.krl.program_structure import ProgramStructure, closure, program_structure
+from postproc.languages.krl.program_structure import (
+    ProgramStructure,
+    closure,
+    program_structure,
+    spread_later,
+)
 from postproc.languages.krl.scan import scan
-from postproc.languages.krl.statement_effects import Effects, is_harmless
+from postproc.languages.krl.statement_effects import Effect, Effects, is_harmless, returned_to
 from postproc.languages.krl.target import UnknownValue
 from postproc.languages.krl.variables import Variables
 from postproc.languages.krl.vectorised import Item
@@ -117,11 +123,36 @@ class OtherModules:
         survey.table_entries |= self.table_entries
         later = survey.later.union(*(module.shared_later for module, _ in self.routines.values()))
         survey.later |= later - own
+        self._share_parameters(survey)
         for module, _ in self.routines.values():
             module.survey.table_entries |= survey.table_entries
             for name in module.survey.later & self.effects.keys():
                 module.survey.later_effects |= {one for one in self.effects[name] if isinstance(one, str)}
             module.survey.later |= later - module.declarations.types.keys() | module.shared_later
+
+    def _share_parameters(self, survey: ProgramStructure) -> None:
+        """Takes up what changes later because it is handed over to another module."""
+        parameters = parameters_of({name: routine for name, (_, routine) in self.routines.items()})
+        for module, routine in self.routines.values():
+            survey.later |= module.survey.later & {name for name, _ in routine.parameters}
+        spread_later(survey, parameters)
+        for module, routine in self.routines.values():
+            module.survey.later |= survey.later & {name for name, _ in routine.parameters}
+        for module in dict.fromkeys(module for module, _ in self.routines.values()):
+            spread_later(module.survey, parameters)
+
+    def stay_apart(self, said: Call, returned: Set[Effect]) -> bool:
+        """Whether the variables that a call hands over to come back are no two of one name, and none of ``returned``
+        is one of the controller, or one that a module may know by its own name."""
+        back = [comes_back for _, comes_back in self.routines[said.name][1].parameters]
+        given = zip(split_values(said.arguments), back, strict=False)
+        names = [name for text, comes_back in given if comes_back and (name := returned_to(text))]
+        surveys = [module.survey for module in dict.fromkeys(module for module, _ in self.routines.values())]
+        return (
+            len(set(names)) == len(names)
+            and all(isinstance(effect, bytes) for effect in returned)
+            and all(returned.isdisjoint(one.read | one.assigned) for one in surveys)
+        )
 
     def directions(self) -> dict[bytes, tuple[bool, ...]]:
         """Name of a routine -> of each parameter whether it comes back changed."""

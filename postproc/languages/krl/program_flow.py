@@ -15,6 +15,7 @@ from postproc.languages.krl.execution_context import Flow
 from postproc.languages.krl.expressions import Value
 from postproc.languages.krl.external_axes import by_themselves
 from postproc.languages.krl.flow_frames import Restart, Unfollowed
+from postproc.languages.krl.later_changes import EVENTS, later_actions, later_functions
 from postproc.languages.krl.lexing import (
     Assignment,
     Call,
@@ -43,12 +44,23 @@ from postproc.languages.krl.other_modules import (
     visible,
 )
 from postproc.languages.krl.program_blocks import Routine
-from postproc.languages.krl.program_structure import INLINE, LATER, closure
-from postproc.languages.krl.statement_effects import EVERYTHING, HIDDEN, effects_of, effects_of_unknown
+from postproc.languages.krl.program_structure import INLINE, closure
+from postproc.languages.krl.statement_effects import (
+    EVERYTHING,
+    HIDDEN,
+    Effect,
+    as_effects,
+    called_in,
+    effects_of,
+    effects_of_unknown,
+    functions_of,
+)
 from postproc.languages.krl.vectorised import Item, VectorisedLines
 from postproc.toolpath import Annotation
 
 _ANNOTATION = re.compile(rb";[ \t]*(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
+
+_WAITS = tuple(Waits)
 
 
 class ProgramFlow(Calls):
@@ -200,6 +212,8 @@ class ProgramFlow(Calls):
             return pc + 1
         if item.comment:
             self._comment(item)
+        if run.walked and run.survey.aliases:
+            self._forget_aliases(item)
         kind, said = item.kind, item.strings
         if kind == "comment":
             return pc + 1
@@ -253,11 +267,22 @@ class ProgramFlow(Calls):
             run.state.feed = NAN  # the block takes a time
         elif kind == "other" and run.survey.has_routine and HIDDEN.search(item.code):
             motions.unknown_motion(run, item)
-        elif item.word in (b"TRIGGER", b"INTERRUPT", b"GLOBAL"):
+        elif item.word in EVENTS:
             if item.word == b"TRIGGER":
                 run.state.no_insert = TRIGGERED
             self._later(item)
         return pc + 1
+
+    def _forget_aliases(self, item: Statement) -> None:
+        """In a routine of whose callers nothing is known: what else a statement changes may have been handed over."""
+        run = self.run
+        changed = effects_of(item, run.survey.directions)[0]
+        if functions_of(item):
+            changed = changed | as_effects(identifiers(item.code))
+        same = changed & run.survey.aliases.keys()
+        if same:
+            others = frozenset[Effect]().union(*(run.survey.aliases[effect] for effect in same)) - changed
+            run.forget(set(others), f"as it may be what line {item.line} changes")
 
     def _advance_run(self, pc: int, item: Statement) -> None:
         """Takes up whether the advance run stops at a statement."""
@@ -265,7 +290,11 @@ class ProgramFlow(Calls):
         ahead = advance_of(item)
         if ahead is not None:
             state.no_advance = ahead
-        state.stop = max(state.stop, stop_of(item, self._is_continued(pc), self.run.type_of))
+        if state.stop is Waits.YES:
+            return
+        if not self.stops[pc]:  # it is the same each time: the types of a routine's names do not change
+            self.stops[pc] = 1 + stop_of(item, self._is_continued(pc), self.run.type_of)
+        state.stop = max(state.stop, _WAITS[self.stops[pc] - 1])
 
     def _is_continued(self, pc: int) -> bool:
         """Whether a CONTINUE is before a statement."""
@@ -317,11 +346,10 @@ class ProgramFlow(Calls):
         """Takes up what an interrupt or a trigger may do from here on."""
         run = self.run
         run.expect_later(run.survey.later_effects, item.line)
-        for name, _ in LATER.findall(item.code):
-            name = name.upper()
-            if name == b"BAS" or name in run.survey.routines:
-                continue
-            if name + b"(" in item.code.upper().replace(b" ", b""):
+        called = called_in(item.code)
+        named = [one.name for one in later_actions(item) if one.name in called]
+        for name in (*named, *later_functions(item.code)):
+            if name != b"BAS" and name not in run.survey.routines:
                 self._unread(item, name)
 
     def _report_letters(self, item: Statement) -> None:

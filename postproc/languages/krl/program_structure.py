@@ -7,12 +7,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from postproc.languages.krl.aliases import Handed, Parameters, parameters_of, spread
+from postproc.languages.krl.later_changes import EVENTS, later_actions, later_functions
 from postproc.languages.krl.lexing import (
     BRANCHES,
     CLOSES,
     FRAME_TABLES,
     LOOPS,
-    NAME,
     Assignment,
     Call,
     Declared,
@@ -28,6 +29,7 @@ from postproc.languages.krl.statement_effects import (
     Directions,
     Effect,
     Effects,
+    as_effects,
     declared_external,
     effects_of,
     effects_of_bas,
@@ -54,8 +56,6 @@ DEEPEST = 100
 
 INLINE = re.compile(rb";[ \t]*FOLD[ \t]+(?:S?(?:PTP|LIN|CIRC)|SPL)(?![A-Za-z0-9_])", re.I)
 _FOLD = re.compile(rb";[ \t]*(END)?FOLD(?![A-Za-z0-9_])", re.I)
-LATER = re.compile(rb"\bDO[ \t]+(" + NAME + rb")(?:[ \t]*+\((.*)\))?", re.I)
-"""The routine that runs, or the variable that is assigned, at a time of its own; and what is handed to it."""
 
 
 @dataclass
@@ -71,7 +71,8 @@ class ProgramStructure:
     start of the routine and name of every label that a GOTO names -> first and last index of these;
     ``effects``: all that the program changes anywhere; ``blocks``: all of them; ``ill_formed``: the code of statements
     with words that have no meaning there; ``directions``: name of a routine ->
-    of each parameter whether it comes back changed.
+    of each parameter whether it comes back changed; ``handed``: what calls hand over;
+    ``aliases``: effect -> what else may be the same variable in a routine of whose callers nothing is known.
     """
 
     events: dict[int, list[tuple[str, Block]]] = field(default_factory=dict)
@@ -89,6 +90,8 @@ class ProgramStructure:
     inline: set[int] = field(default_factory=set)
     unclosed: list[tuple[int, str]] = field(default_factory=list)
     directions: dict[bytes, tuple[bool, ...]] = field(default_factory=dict)
+    handed: set[Handed] = field(default_factory=set)
+    aliases: dict[Effect, frozenset[Effect]] = field(default_factory=dict)
 
     @property
     def has_routine(self) -> bool:
@@ -275,6 +278,7 @@ class _Surveyor:
         if not all(map(is_harmless, functions)):
             # What is handed to a function may come back changed.
             effects = effects | identifiers(statement.code)
+            found.handed.add(Handed(functions, statement.code, is_call=False))
         _join(found.effects, effects)
         said = statement.strings
         if statement.word in (b"EXT", b"EXTFCT", b"EXTP") and (declared := declared_external(statement)):
@@ -287,23 +291,39 @@ class _Surveyor:
             found.assigned.update(effect for effect in effects if isinstance(effect, bytes))
         if isinstance(said, Call) and not effects.isdisjoint(FRAME_TABLES):
             found.table_entries |= entries_given(said)
+        if isinstance(said, Call) and said.arguments:
+            found.handed.add(Handed((said.name,), said.arguments, is_call=True))
         if isinstance(said, Declared) and self.routine is not None:
             for key, _, _ in said.items:
                 if key is not None:
                     self.routine.types[key.split(b"[")[0]] = said.type
         found.read |= read_by(statement)
-        if statement.word in (b"INTERRUPT", b"TRIGGER", b"GLOBAL"):
-            for name, given in LATER.findall(statement.code):
-                call = Call(name.upper(), given)
-                is_bas = call.name == b"BAS"
-                named = effects_of_bas(given) if is_bas else {call.name, *returned_by(call, found.directions)}
-                found.later |= {effect for effect in named if isinstance(effect, bytes)}
-                found.later_effects |= {effect for effect in named if isinstance(effect, str)}
+        if statement.word in EVENTS:
+            self._event(statement)
         if stack:
             _join(stack[-1].effects, effects)
             stack[-1].calls.update(functions)
             if called:
                 stack[-1].calls.add(called)
+
+    def _event(self, statement: Statement) -> None:
+        """Takes up what an interrupt or a trigger does."""
+        found = self.found
+        named: Effects = set(later_functions(statement.code))
+        if named:  # what is handed to a function may come back changed
+            found.handed.add(Handed(later_functions(statement.code), statement.code, is_call=False))
+            named |= as_effects(identifiers(statement.code))
+        for call in later_actions(statement):
+            is_bas = call.name == b"BAS"
+            named |= (
+                effects_of_bas(call.arguments)
+                if is_bas
+                else {call.name, *returned_by(call, found.directions)}
+            )
+            if call.arguments:
+                found.handed.add(Handed((call.name,), call.arguments, is_call=True))
+        found.later |= {effect for effect in named if isinstance(effect, bytes)}
+        found.later_effects |= {effect for effect in named if isinstance(effect, str)}
 
 
 def program_structure(
@@ -335,7 +355,15 @@ def program_structure(
         found.later.update(effect for effect in effects if isinstance(effect, bytes))
         if "all" in effects:
             found.later.update(name.partition(b".")[0] for name in found.assigned)
+    spread_later(found, {})
     return found
+
+
+def spread_later(found: ProgramStructure, others: Mapping[bytes, Parameters]) -> None:
+    """Takes up what changes later by the parameters of routines; others: those of other modules."""
+    every = spread(found.later, found.handed, {**others, **parameters_of(found.routines)})
+    found.later |= {effect for effect in every if isinstance(effect, bytes)}
+    found.later_effects |= {effect for effect in every if isinstance(effect, str)}
 
 
 def closure(found: ProgramStructure, names: Iterable[bytes]) -> set[bytes]:

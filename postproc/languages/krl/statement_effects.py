@@ -67,7 +67,7 @@ _CALLING = frozenset(
     ["assignment", "branch", "call", "declaration", "foreign", "open", "close", "return", "motion"]
 )
 """Kinds of statement whose expressions may call functions, besides the words below."""
-_EVALUATING = frozenset([b"WAIT", b"TRIGGER", b"ANOUT", b"ANIN"])
+_EVALUATING = frozenset(b"WAIT TRIGGER ANOUT ANIN DIGIN ASYPTP ASYCONT TIME_BLOCK".split())
 _DO = re.compile(rb"(?<![A-Za-z0-9_$])DO(?![A-Za-z0-9_$])", re.I)
 
 _COUNTER = re.compile(rb"FOR[ \t]+(" + NAME + rb")[ \t]*=", re.I)
@@ -149,12 +149,13 @@ def functions_of(statement: Statement) -> tuple[bytes, ...]:
     if b"(" not in code:
         return ()
     if statement.kind == "motion":
-        return tuple(name for name in _functions(code[len(statement.word) :]) if name not in _IN_MOTIONS)
-    return _functions(code)
+        return tuple(name for name in called_in(code[len(statement.word) :]) if name not in _IN_MOTIONS)
+    return called_in(code)
 
 
 @kept
-def _functions(code: bytes) -> tuple[bytes, ...]:
+def called_in(code: bytes) -> tuple[bytes, ...]:
+    """The names in an expression behind which a bracket opens, upper case."""
     names = dict.fromkeys(name.upper() for name in _FUNCTION.findall(without_strings(code)))
     return tuple(name for name in names if name not in _WORDS)
 
@@ -202,7 +203,7 @@ def effects_of_unknown(code: bytes) -> Effects:
     names = identifiers(text)
     effects = as_effects(name.upper() for name in _ASSIGNED.findall(text))
     effects |= {SYSTEM[name] for name in names if name in SYSTEM}
-    functions = [name for name in _functions(text) if not is_harmless(name)]
+    functions = [name for name in called_in(text) if not is_harmless(name)]
     if functions:
         effects |= as_effects(names)
     if functions or HIDDEN.search(text):
@@ -217,10 +218,16 @@ def returned_by(said: Call, known: Directions) -> frozenset[Effect]:
     comes_back = known.get(said.name, ())
     names = set()
     for i, text in enumerate(split_values(said.arguments)):
-        found = _RETURNED.match(text)
-        if found and (i >= len(comes_back) or comes_back[i]):
-            names.add(found[1].upper())
+        name = returned_to(text) if i >= len(comes_back) or comes_back[i] else None
+        if name is not None:
+            names.add(name)
     return frozenset(as_effects(names))
+
+
+def returned_to(text: bytes) -> bytes | None:
+    """The variable that a parameter changes for which ``text`` is handed over; None where that is an expression."""
+    found = _RETURNED.match(text)
+    return found[1].upper() if found else None
 
 
 def entries_given(said: Call) -> set[bytes | None]:
