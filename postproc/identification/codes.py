@@ -109,7 +109,7 @@ CODES = define(
         "IDN035": Code(
             "error",
             "readings of another arm",
-            meaning="Whatever the lengths and zeros, or the compliances, of this arm are, the readings remain unexplained.",
+            meaning="No lengths and zeros, or no compliances, of this arm explain the readings.",
             consequence="Identified values would describe neither arm.",
             action="Use --robot with the robot that was measured, and check joint angles and loads.",
             example="The campaign of another robot in the same folder.",

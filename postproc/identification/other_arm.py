@@ -30,7 +30,7 @@ EXTENT = 0.02
 the same kind some twentieth."""
 
 ROUNDS, STEPS, FAR_OUT = 3, 6, 5.0
-"""Fits, each without the readings that the one before left further away than so many times the median; steps of each."""
+"""Fits, each without the readings that the one before left further away than so many medians; steps of each."""
 
 
 def check_arm(campaign: Campaign, model: StiffnessModel) -> None:
@@ -42,7 +42,7 @@ def check_arm(campaign: Campaign, model: StiffnessModel) -> None:
     campaign = Campaign(readings, campaign.stated_tool)
     asked = asked_for(model, ELASTIC if readings.deflection else GEOMETRY)
     unknowns = with_gauge(asked.unknowns)
-    rows = np.isfinite(readings.value).all(axis=1)
+    rows: Bools = np.asarray(np.isfinite(readings.value).all(axis=1))
     remaining = 0.0
     for _ in range(ROUNDS):
         away = _distances(campaign, asked.model, unknowns, rows)
@@ -60,8 +60,8 @@ def check_arm(campaign: Campaign, model: StiffnessModel) -> None:
         if remaining <= POOR * extent:
             return
         message = (
-            f"no stiffness of this arm explains the readings: {100 * remaining / extent:.0f} % of the deflections remain"
-            " even with all its joints, bearings and the base compliant"
+            f"no stiffness of this arm explains the readings: {100 * remaining / extent:.0f} % of the deflections"
+            " remain even with all its joints, bearings and the base compliant"
         )
         help = (
             "check robot, joint angles and loads; state the column SIGMA where the readings scatter so much;"
