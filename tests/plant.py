@@ -137,7 +137,7 @@ class Plant:
         self.row_of = {name: int(self.model.joint(name).dofadr[0]) for name in (*BASE, *MOTORS, *TILTS, *TIP)}
         self.motor_rows = np.array([self.row_of[name] for name in MOTORS])
         self.compliances = np.array([gives[self.model.joint(i).name] for i in range(self.size)])
-        self._free = np.flatnonzero(self.compliances)
+        self.free_rows = np.flatnonzero(self.compliances)
         self._bearings = [self.model.body(f"bearing{i}").id for i in range(1, 7)]
         self._places = self.model.body_pos[self._bearings].copy()
         self.last_body, self.tip_body = self.model.body("link6").id, self.model.body("tip").id
@@ -226,11 +226,11 @@ class Plant:
         ``slowed``: an arm that creeps under the load instead, a damper beside each spring, by steps of implicit Euler
         that lengthen as the force falls (Kelley and Keyes 1998, 10.1137/S0036142996304796).
         """
-        moving, coordinates = self._free, free.copy()
+        moving, coordinates = self.free_rows, free.copy()
         damping, time, last = np.diag(1 / self.compliances[moving]), 0.1, np.inf
         for _ in range(400 if slowed else 40):
             force = self.residual(coordinates, free, held, wrench)[moving]
-            slope = self._slope(coordinates, free, held, wrench)
+            slope = self.slope(coordinates, free, held, wrench)
             if slowed:
                 size = float(np.linalg.norm(force))
                 time *= min(last / size, 2.0) if 0 < size < np.inf and last < np.inf else 1.0
@@ -338,12 +338,12 @@ class Plant:
             force[rows] += stiffness * 0.5 * self.hardware.gap * side
         return force
 
-    def _slope(self, coordinates: np.ndarray, *rest: np.ndarray) -> np.ndarray:
+    def slope(self, coordinates: np.ndarray, *rest: np.ndarray) -> np.ndarray:
         step, columns = 1e-6, []
-        for row in self._free:
+        for row in self.free_rows:
             move = np.zeros(self.size)
             move[row] = step
-            ends = [self.residual(coordinates + sign * move, *rest)[self._free] for sign in (1, -1)]
+            ends = [self.residual(coordinates + sign * move, *rest)[self.free_rows] for sign in (1, -1)]
             columns.append((ends[0] - ends[1]) / (2 * step))
         return np.stack(columns, axis=1)
 

@@ -37,7 +37,7 @@ def test_an_arm_whose_torque_passes_through_its_gap_comes_to_rest() -> None:
     free = plant.coordinates_of(motors)
     plant.place(free, free)
     held = -plant.data.qfrc_passive.copy()
-    left = plant.residual(plant.coordinates_of(at_rest), free, held, force)[plant._free]
+    left = plant.residual(plant.coordinates_of(at_rest), free, held, force)[plant.free_rows]
     assert np.abs(left).max() < 1e-6
 
 
@@ -54,5 +54,5 @@ def test_an_arm_does_not_rest_between_the_sides_of_a_gap(seed: int) -> None:
     free = plant.coordinates_of(motors)
     plant.place(free, free)
     held = -plant.data.qfrc_passive.copy()
-    slope = plant._slope(plant.coordinates_of(at_rest), free, held, force)
+    slope = plant.slope(plant.coordinates_of(at_rest), free, held, force)
     assert np.linalg.eigvals(slope).real.max() < 0

@@ -6,8 +6,8 @@ negative one of 0.5), and by gaps, loops and compliances, which have no negative
 as well as they can be, with the effects that each of them asks for, and compared.  Where robot and forces are as usual
 the ratio is about one (``python -m tests.blind_parts.bad_files``): then only measured places show the sign.
 
-From a ratio of exp(3) = 20 on a file is refused.  Where one file in twenty has a wrong sign, it is then as likely wrong as
-right, and the ratio exceeds 20 for at most 5 % of the right ones: its mean over these is one (Ville's inequality).
+From a ratio of exp(3) = 20 on a file is refused.  Where one file in twenty has a wrong sign, it is then as likely wrong
+as right, and the ratio exceeds 20 for at most 5 % of the right ones: its mean over these is one (Markov's inequality).
 Between 1/20 and 20 the file is learnt from with a warning.
 """
 
