@@ -239,7 +239,9 @@ def _zeros_of(search: Search, named: Sequence[Named], its: Evidence) -> list[Nam
     whole = [c for c in search.linear.candidates if (c.name, c.joint) == (JointOffset.name, EVERY)]
     for candidate in whole:
         estimates = _estimates(search.confirmed, candidate, search)
-        joints = clear_joints(candidate, estimates, search.confirmed)
+        # they belong to a geometry that is shown already: each counts for itself
+        off = [e for e in estimates if abs(e.value - e.unknown.parameter.null) > e.ci95]
+        joints = tuple(dict.fromkeys(e.unknown.parameter.joint for e in off))
         if joints:
             return [Named(candidate, joints, estimates, its)]
     return []
