@@ -137,7 +137,7 @@ class Plant:
         self.row_of = {name: int(self.model.joint(name).dofadr[0]) for name in (*BASE, *MOTORS, *TILTS, *TIP)}
         self.motor_rows = np.array([self.row_of[name] for name in MOTORS])
         self.compliances = np.array([gives[self.model.joint(i).name] for i in range(self.size)])
-        self._free = np.flatnonzero(self.compliances)
+        self.free_rows = np.flatnonzero(self.compliances)
         self._bearings = [self.model.body(f"bearing{i}").id for i in range(1, 7)]
         self._places = self.model.body_pos[self._bearings].copy()
         self.last_body, self.tip_body = self.model.body("link6").id, self.model.body("tip").id
@@ -208,17 +208,39 @@ class Plant:
             # without load the joints' springs are slack: what is left is the tendon
             self.place(free, free)
             held = -self.data.qfrc_passive.copy()
-        moving, coordinates = self._free, free.copy()
-        for _ in range(40):
-            step = np.linalg.solve(
-                self._slope(coordinates, free, held, wrench),
-                -self.residual(coordinates, free, held, wrench)[moving],
-            )
-            coordinates[moving] += step
-            if np.abs(step).max() < STEP_TOLERANCE:
+        for slowed in (False, True):
+            coordinates = self._equilibrium(slowed, free, held, wrench)
+            if coordinates is not None:
                 self.place(coordinates, free)
                 return Rest(coordinates[self.motor_rows], *self.tcp())
-        raise ArithmeticError("Newton's method found no equilibrium")
+        raise ArithmeticError(
+            "no equilibrium was found, neither by Newton's method nor by an arm that creeps"
+        )
+
+    def _equilibrium(
+        self, slowed: bool, free: np.ndarray, held: np.ndarray, wrench: np.ndarray
+    ) -> np.ndarray | None:
+        """All coordinates at rest by Newton's method from the unloaded ones, None where it circles or ends between the
+        sides of a gap, whence the arm would fall to one: about a gap the force does not fall evenly.
+
+        ``slowed``: an arm that creeps under the load instead, a damper beside each spring, by steps of implicit Euler
+        that lengthen as the force falls (Kelley and Keyes 1998, 10.1137/S0036142996304796).
+        """
+        moving, coordinates = self.free_rows, free.copy()
+        damping, time, last = np.diag(1 / self.compliances[moving]), 0.1, np.inf
+        for _ in range(400 if slowed else 40):
+            force = self.residual(coordinates, free, held, wrench)[moving]
+            slope = self.slope(coordinates, free, held, wrench)
+            if slowed:
+                size = float(np.linalg.norm(force))
+                time *= min(last / size, 2.0) if 0 < size < np.inf and last < np.inf else 1.0
+                slope, last = slope - damping / time, size
+            step = np.linalg.solve(slope, -force)
+            coordinates[moving] += step
+            if np.abs(step).max() < STEP_TOLERANCE:
+                falls = not slowed and self.hardware.gap.any() and np.linalg.eigvals(slope).real.max() > 0
+                return None if falls else coordinates
+        return None
 
     def energy(self, coordinates: np.ndarray, motors: np.ndarray) -> float:
         """[J] in all springs."""
@@ -316,12 +338,12 @@ class Plant:
             force[rows] += stiffness * 0.5 * self.hardware.gap * side
         return force
 
-    def _slope(self, coordinates: np.ndarray, *rest: np.ndarray) -> np.ndarray:
+    def slope(self, coordinates: np.ndarray, *rest: np.ndarray) -> np.ndarray:
         step, columns = 1e-6, []
-        for row in self._free:
+        for row in self.free_rows:
             move = np.zeros(self.size)
             move[row] = step
-            ends = [self.residual(coordinates + sign * move, *rest)[self._free] for sign in (1, -1)]
+            ends = [self.residual(coordinates + sign * move, *rest)[self.free_rows] for sign in (1, -1)]
             columns.append((ends[0] - ends[1]) / (2 * step))
         return np.stack(columns, axis=1)
 

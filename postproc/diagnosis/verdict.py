@@ -68,6 +68,9 @@ WORST = 1.1
 """By how much the largest residual of poses that were left out may grow with an effect."""
 
 
+CHANCE_OF_JOINT = 0.05
+"""Probability that any joint without an effect that is fitted to all of them is said to have it."""
+
 NOT_ENOUGH = "too much would remain for a name"
 AS_WELL = "another course over the same joint explains as much, and more remains than scatter"
 OTHER_COURSE = "the readings follow another course than that of this effect"
@@ -163,7 +166,7 @@ def judge(search: Search) -> Verdict:
             rejected.append((candidate, "its parameters would have to lie at their bounds"))
         else:
             joints, fixed = (
-                _joints(candidate, estimates),
+                clear_joints(candidate, estimates, search.confirmed),
                 _fixed_values(search.confirmed, candidate, estimates),
             )
             named.append(Named(candidate, joints, estimates, its, fixed))
@@ -236,7 +239,9 @@ def _zeros_of(search: Search, named: Sequence[Named], its: Evidence) -> list[Nam
     whole = [c for c in search.linear.candidates if (c.name, c.joint) == (JointOffset.name, EVERY)]
     for candidate in whole:
         estimates = _estimates(search.confirmed, candidate, search)
-        joints = _joints(candidate, estimates)
+        # they belong to a geometry that is shown already: each counts for itself
+        off = [e for e in estimates if abs(e.value - e.unknown.parameter.null) > e.ci95]
+        joints = tuple(dict.fromkeys(e.unknown.parameter.joint for e in off))
         if joints:
             return [Named(candidate, joints, estimates, its)]
     return []
@@ -373,11 +378,27 @@ def _estimates(final: Fit, candidate: Candidate, search: Search) -> tuple[Estima
     )
 
 
-def _joints(candidate: Candidate, estimates: Sequence[Estimate]) -> tuple[str, ...]:
+def clear_joints(candidate: Candidate, estimates: Sequence[Estimate], final: Fit) -> tuple[str, ...]:
+    """The joints that clearly have an effect, as ``final`` has its ``estimates``: where its parameters there, together,
+    are off by more than chance leaves of any of the joints that were looked at (Bonferroni)."""
+    from scipy.special import fdtri
+
     if candidate.joint != EVERY:
         return (candidate.joint,) if candidate.joint else ()
-    clear = [e.unknown.parameter.joint for e in estimates if abs(e.value - e.unknown.parameter.null) > e.ci95]
-    return tuple(dict.fromkeys(clear))
+    place = {unknown.key: k for k, unknown in enumerate(final.unknowns)}
+    deviation = np.sqrt(np.diag(final.covariance))
+    own: dict[str, list[Estimate]] = {}
+    for estimate in estimates:
+        own.setdefault(estimate.unknown.parameter.joint, []).append(estimate)
+    clear = []
+    for joint, several in own.items():
+        rows = [place[e.unknown.key] for e in several]
+        off = np.array([e.value - e.unknown.parameter.null for e in several]) / deviation[rows]
+        among = final.covariance[np.ix_(rows, rows)] / np.outer(deviation[rows], deviation[rows])
+        limit = len(rows) * fdtri(len(rows), max(1, final.freedom), 1.0 - CHANCE_OF_JOINT / len(own))
+        if off @ np.linalg.solve(among, off) > limit:
+            clear.append(joint)
+    return tuple(clear)
 
 
 def with_estimates(verdict: Verdict, final: Fit, search: Search) -> Verdict:

@@ -106,5 +106,13 @@ CODES = define(
             action="Move the measured values by one row from there on.",
             example="One pose was skipped, its row was not.",
         ),
+        "IDN035": Code(
+            "error",
+            "readings of another arm",
+            meaning="No lengths and zeros, or no compliances, of this arm explain the readings.",
+            consequence="Identified values would describe neither arm.",
+            action="Use --robot with the robot that was measured, and check joint angles and loads.",
+            example="The campaign of another robot in the same folder.",
+        ),
     }
 )

@@ -5,6 +5,10 @@ shows by shares, which are not linear (an error that is half as large again need
 negative one of 0.5), and by gaps, loops and compliances, which have no negative values.  So both readings are explained
 as well as they can be, with the effects that each of them asks for, and compared.  Where robot and forces are as usual
 the ratio is about one (``python -m tests.blind_parts.bad_files``): then only measured places show the sign.
+
+From a ratio of exp(3) = 20 on a file is refused.  Where one file in twenty has a wrong sign, it is then as likely wrong
+as right, and the ratio exceeds 20 for at most 5 % of the right ones: its mean over these is one (Markov's inequality).
+Between 1/20 and 20 the file is learnt from with a warning.
 """
 
 from __future__ import annotations
@@ -20,9 +24,6 @@ from postproc.learning.attribution import Attribution, attribute, evidence_of
 from postproc.learning.candidates import Circumstances
 from postproc.learning.causes import CausePrediction
 from postproc.learning.plausible import EXCHANGED, LIKELIER, wrong_program, wrong_sign
-
-TURNED = 5.0
-"""Logarithm: how much likelier the other sign of a file must be; measured places overrule it."""
 
 HOPELESS = 100.0
 """Logarithm: a reading that is so much less likely by the known causes gets no effects of its own."""
@@ -50,7 +51,7 @@ def check_readings(
         if not part.sign_seen:
             other = np.where(part.points, -deviation, deviation)
             turned = _likeliest(known, result, around, other, search=alone) - present
-            if turned > (TURNED if alone else EXCHANGED):
+            if turned > (LIKELIER if alone else EXCHANGED):
                 return [wrong_sign(turned, part.file)]
         if part.original:
             uncorrected = np.where(part.points, known.errors(known.before[0]), 0.0)

@@ -17,6 +17,7 @@ from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
 from postproc.identification.identifiable import strong_correlations
 from postproc.identification.mounting import check_mounting
+from postproc.identification.other_arm import check_arm
 from postproc.identification.outliers import Outlier, outliers
 from postproc.identification.sanity_checks import check_fit, check_numbers
 from postproc.identification.unknowns import FitRequest, asked_for, with_gauge
@@ -97,7 +98,10 @@ def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress
     asked = replace(asked, unknowns=with_gauge(asked.unknowns))
     check_numbers(measured.readings, asked.unknowns, asked.model)
     stage("comparing")
-    findings = [*measured.findings, *check_fit(campaign, asked.model, asked.unknowns)]
+    bad = check_fit(campaign, asked.model, asked.unknowns)
+    if bad:
+        check_arm(campaign, asked.model)
+    findings = [*measured.findings, *bad]
     every = np.ones(len(campaign), bool)
     stage("registering")
     before = fit(campaign, model, (), every)

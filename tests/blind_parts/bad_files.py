@@ -31,27 +31,32 @@ Cells = np.ndarray
 
 
 def _numbers(
-    change: Callable[[Cells, np.random.Generator], None],
+    change: Callable[[Cells, np.random.Generator], None], columns: slice = slice(0, 7)
 ) -> Callable[[Lines, np.random.Generator], Lines]:
-    """A mistake in the columns X, Y, Z, NX, NY, NZ, DEV (K, 7)."""
+    """A mistake in the columns X, Y, Z, NX, NY, NZ, DEV (K, 7), or in others."""
 
     def spoil(lines: Lines, rng: np.random.Generator) -> Lines:
         rows = [line.split(",") for line in lines[HEAD:]]
-        cells = np.array([row[:7] for row in rows], float)
+        cells = np.array([row[columns] for row in rows], float)
         change(cells, rng)
-        body = [
-            ",".join([*(f"{x:.6f}" for x in own), *row[7:]]) for own, row in zip(cells, rows, strict=True)
-        ]
-        return [*lines[:HEAD], *body]
+        for own, row in zip(cells, rows, strict=True):
+            row[columns] = [f"{x:.6f}" for x in own]
+        return [*lines[:HEAD], *(",".join(row) for row in rows)]
 
     return spoil
 
 
-def _columns(one: int, other: int) -> Callable[[Lines, np.random.Generator], Lines]:
+MEASURED = slice(8, 11)
+"""The columns MX, MY, MZ."""
+
+
+def _columns(
+    one: int, other: int, columns: slice = slice(0, 7)
+) -> Callable[[Lines, np.random.Generator], Lines]:
     def change(cells: Cells, rng: np.random.Generator) -> None:
         cells[:, [one, other]] = cells[:, [other, one]]
 
-    return _numbers(change)
+    return _numbers(change, columns)
 
 
 def _scaled(columns: list[int], factor: float) -> Callable[[Lines, np.random.Generator], Lines]:
@@ -67,6 +72,14 @@ def _sign(cells: Cells, rng: np.random.Generator) -> None:
 
 def _shuffled(cells: Cells, rng: np.random.Generator) -> None:
     cells[:, 6] = rng.permutation(cells[:, 6])
+
+
+def _places_shuffled(cells: Cells, rng: np.random.Generator) -> None:
+    cells[:] = rng.permutation(cells)
+
+
+def _places_shifted(cells: Cells, rng: np.random.Generator) -> None:
+    cells[:] = np.roll(cells, 1, axis=0)
 
 
 def _shifted(cells: Cells, rng: np.random.Generator) -> None:
@@ -124,6 +137,11 @@ MISTAKES: dict[str, Callable[[Lines, np.random.Generator], Lines]] = {
     "all in inches": _scaled([0, 1, 2, 6], 1 / 25.4),
     "radius of the probe": _numbers(_radius),
     "actual for nominal": _numbers(_actual),
+    "columns MX and MY" + PLACES: _columns(0, 1, MEASURED),
+    "columns MX and MZ" + PLACES: _columns(0, 2, MEASURED),
+    "columns MY and MZ" + PLACES: _columns(1, 2, MEASURED),
+    "places shuffled" + PLACES: _numbers(_places_shuffled, MEASURED),
+    "places shifted by one" + PLACES: _numbers(_places_shifted, MEASURED),
 }
 """A wrong sign is that of a part of the uncompensated program: on a well compensated one either sign is as likely, and
 those are counted by themselves, without and with measured places."""
@@ -175,7 +193,10 @@ def main() -> None:
                 try:
                     done = learn(LearnRequest(Request(original, force=""), (path,), dry_run=True))
                     answer = "learnt" if done.promise.better else "nothing written"
-                    unseen[mistake] += answer == "learnt" and any(f.code == "LRN019" for f in done.findings)
+                    warned = [f for f in done.findings if f.code == "LRN019"]
+                    unseen[mistake] += answer == "learnt" and bool(warned)
+                    if chosen.details and warned:
+                        print(mistake, warned[0].message[:150])
                 except Refusal as refusal:
                     answer = refusal.findings[0].code
                     if chosen.details:

@@ -72,6 +72,7 @@ def main() -> None:
             ),
             "outliers": int((~result.kept).sum()),
             "exit": learned.exit,
+            "codes": sorted({finding.code for finding in learned.findings}),
         }
         print(json.dumps(answer), flush=True)
 
