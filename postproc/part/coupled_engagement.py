@@ -33,7 +33,7 @@ MOST_PIECES = 300_000
 SPACING, FINER = 0.5, 4
 """Radii of the cutter between two places, and how many times closer they are where the nominal cut changes."""
 
-CLOSE, AFTER, BEFORE = 0.2 * MM, 2 * MM, 1 * MM
+CLOSE, AFTER, BEFORE = 0.25 * MM, 2 * MM, 1 * MM
 """Places are as close near a vertex at which the path turns, and where the correction changes, up to so far after it
 and before it: there the tool turns over some tenths of a millimetre."""
 
