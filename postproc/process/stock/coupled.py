@@ -36,7 +36,7 @@ AS_STRAIGHT = 1e-6
 """[m] A turn of the tool that moves its edges by less along a piece is taken by its mean."""
 
 _STEPS, _TURNS, _HALVINGS = 8, 3, 18
-_DAMPED, _TURNING = 24, 0.2
+_DAMPED, _TURNING = 24, 0.7
 """Damped steps; and the share of the way from place to place by which the tool is displaced where it turns by much."""
 
 _VARIED = 3e-6  # m: by which a derivative looks aside, and as a share of the displacement:
