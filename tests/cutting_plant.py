@@ -429,7 +429,9 @@ class Machine:
         if size > SETTLED * 100:
             sizes = np.array([100, 100, 100, 1000, 1000, 1000.0])
             for start in (first, wrench):
-                found = root(lambda x: meet(x * sizes) / sizes, start / sizes, options={"eps": 1e-6, "xtol": 1e-5})
+                found = root(
+                    lambda x: meet(x * sizes) / sizes, start / sizes, options={"eps": 1e-6, "xtol": 1e-5}
+                )
                 other = np.linalg.norm((slope @ meet(found.x * sizes))[:3])
                 if other < size:
                     size, wrench = other, found.x * sizes

@@ -34,14 +34,20 @@ SPACING, FINER = 0.5, 4
 """Radii of the cutter between two places, and how many times closer they are where the nominal cut changes."""
 
 CLOSE, AFTER, BEFORE = 0.25 * MM, 2 * MM, 1 * MM
-"""Places are as close near a vertex at which the path turns, and where the correction changes, up to so far after it
-and before it: there the tool turns over some tenths of a millimetre."""
+"""Places are as close near a vertex at which the path turns, up to so far after it and before it: there the tool turns
+over some tenths of a millimetre."""
+
+INSERTED = 0.5 * MM
+"""Places are as close between points that the correction inserts."""
 
 ENOUGH = 0.5e-6
 """[m] The linear displacement differs from that of the model by less at the solution."""
 
 _APART, _FAR = 1e-6, 3 * MM
 """[m] Places that are closer are one; inserted points that are farther apart have the usual places between."""
+
+UNSETTLED = 5e-6
+"""[m] Above it the material gives way: no place near the one before is at rest under the force that is met there."""
 
 _STEP, _LEVER = 10.0, 0.05
 """[N] by which the wrench is varied, and [m] by which moments are."""
@@ -73,7 +79,7 @@ class CoupledEngagement:
 
     key (K,): twice the motion plus the share of its path, ascending; wrench (K, 6) [N, N m] in path axes; area (K,)
     [m2] removed across the feed; residual [m]: the largest difference between both displacements; pieces: the sweeps
-    from one place to the next.
+    from one place to the next; unsettled (U,): motions with a place at which both differ by more than ``UNSETTLED``.
     """
 
     key: Floats
@@ -81,6 +87,7 @@ class CoupledEngagement:
     area: Floats
     residual: float
     pieces: Paths
+    unsettled: Ints
 
     def along(self, motion: Ints, share: Floats) -> Floats:
         """(K, 6) [N, N m] the wrench at the shares (K,) of motions (K,); zero where nothing was solved."""
@@ -143,7 +150,8 @@ def solve_coupled(
     assert solved is not None
     key, wrench, area = _by_motion(at_motion, at_share, wrench, solved.area, motion, share, fresh, start)
     pieces = Paths(rows, motion, share, paths.which[owner], paths.number[owner])
-    return CoupledEngagement(key, wrench, area, float(solved.residual.max()), pieces)
+    unsettled = np.unique(at_motion[solved.residual > UNSETTLED])
+    return CoupledEngagement(key, wrench, area, float(solved.residual.max()), pieces, unsettled)
 
 
 def _pieces(run: StockRun, paths: Paths, division: Subdivision | None) -> tuple[Floats, Ints, Floats]:
@@ -153,7 +161,7 @@ def _pieces(run: StockRun, paths: Paths, division: Subdivision | None) -> tuple[
     uneven = np.isin(paths.number, run.engagement.uneven)
     even = np.maximum(np.ceil(length * np.where(uneven, FINER, 1) / (SPACING * radius)), 1).astype(np.int64)
     points = [_steps(np.zeros(len(length)), np.ones(len(length)), even)]
-    start, end = _vertices(paths)
+    start, end = find_vertices(paths)
     reach = length / np.maximum(length, 1e-12)
     for at, low, high in (
         (start, np.zeros(len(length)), np.minimum(AFTER / np.maximum(length, 1e-12), reach)),
@@ -205,13 +213,13 @@ def _inserted(paths: Paths, length: Floats, division: Subdivision) -> tuple[Ints
         ends = np.concatenate([[0.0], (at[first[k] : last[k]] - low[k]) / wide[k], [1.0]])
         for begin, stop in pairwise(ends):
             far = (stop - begin) * length[k]
-            count = int(np.ceil(far / CLOSE)) if far < _FAR else 1
+            count = int(np.ceil(far / INSERTED)) if far < _FAR else 1
             parts.append(np.linspace(begin, stop, count + 1))
             sweeps.append(np.full(count + 1, k))
     return np.concatenate(sweeps), np.clip(np.concatenate(parts), 0.0, 1.0)
 
 
-def _vertices(paths: Paths) -> tuple[Bools, Bools]:
+def find_vertices(paths: Paths) -> tuple[Bools, Bools]:
     """(M,) sweeps that start, and that end, where the path turns inside of a cut."""
     rows = paths.rows
     goes_on = _joined(rows, rows[:, CUTTER])

@@ -6,10 +6,11 @@ the displaced tools before it left.  The tool cuts in the direction in which it 
 b + S w, and with the chip of its own speed: where the path turns it follows only as it yields.
 
 Steps go along secants (Anderson, D. G., Iterative procedures for nonlinear integral equations, 1965,
-doi:10.1145/321296.321305, of depth 1).  Where places are nearer to each other than the tool is displaced, a small change
-of the wrench turns the direction by much: there steps follow the derivative, damped (Marquardt, D. W., An algorithm for
-least-squares estimation of nonlinear parameters, 1963, doi:10.1137/0111030).  Where neither settles, as in a spring
-pass, whose force rises steeply with the first micrometres, the size of the wrench is bracketed along its direction.
+doi:10.1145/321296.321305, of depth 1).  Where places are nearer to each other than the tool is displaced, a small
+change of the wrench turns the direction by much: there steps follow the derivative, damped (Marquardt, D. W., An
+algorithm for least-squares estimation of nonlinear parameters, 1963, doi:10.1137/0111030).  Where neither settles, as
+in a spring pass, whose force rises steeply with the first micrometres, the size of the wrench is bracketed along its
+direction.
 """
 
 from __future__ import annotations
@@ -135,7 +136,8 @@ def _met(
 ) -> float:  # fmt: skip
     """``out`` (6,): the wrench that the tool meets where ``wrench`` (6,) displaces it to; the removed area [m2].
 
-    came (4,): displacement [m] from which the tool comes, and the length [m] of its path since, 0 where none is known."""
+    came (4,): displacement [m] from which the tool comes, and the length [m] of its path since, 0 where it is not
+    known."""
     d = np.zeros(6)
     _displacement(nodes, k, wrench, d)
     moved[:] = pose
@@ -205,7 +207,9 @@ def _solve(
     r, r_before = np.zeros(6), np.zeros(6)
     w[:] = nodes.wrench[k]
     best = np.inf
-    turning = max(_size(slope, w, lever), _size(slope, nodes.wrench[before], lever)) > _TURNING * came[3] > 0.0
+    turning = (
+        max(_size(slope, w, lever), _size(slope, nodes.wrench[before], lever)) > _TURNING * came[3] > 0.0
+    )
     if turning and _settle_turning(stock, profile, pose, came, law, live, time, nodes, before, k, lever):
         return
     for step in range(0 if turning else _STEPS):
@@ -261,7 +265,7 @@ def _settle_turning(
         if size < best:
             best, at_best = size, area
             w[:], g[:] = trial, varied
-    for step in range(_DAMPED):
+    for _ in range(_DAMPED):
         nodes.wrench[k, :] = w
         nodes.residual[k], nodes.area[k] = best, at_best
         if best <= SETTLED + OF_DISPLACEMENT * _size(slope, g, lever):
