@@ -73,7 +73,7 @@ def _near_vertex(side: PartSide, motion: Ints, task: CompensationProblem, run: S
     for which, at, share in ((after, start, paths.share[:, 0]), (before, end, paths.share[:, 1])):
         which[paths.motion[at]] = share[at]
     gap = np.minimum(_gap(side.share - after[motion]), _gap(before[motion] - side.share))
-    return np.asarray(gap * length[motion] <= AFTER)
+    return np.asarray(np.isfinite(gap) & (np.nan_to_num(gap, posinf=0.0) * length[motion] <= AFTER))
 
 
 def _gap(share: Floats) -> Floats:
