@@ -242,7 +242,7 @@ def _directions(rows: Floats, share: float) -> Floats:
     """(P, 3) the direction of the tip at ``share`` of sweeps, by a small step of them."""
     step = 1e-4 if share == 0.0 else -1e-4
     ends = [tips_of(rows, np.full(len(rows), at)) for at in (share, share + step)]
-    return (ends[1] - ends[0]) * np.sign(step)
+    return np.asarray((ends[1] - ends[0]) * np.sign(step))
 
 
 def _cosine(one: Floats, other: Floats) -> Floats:
