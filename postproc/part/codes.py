@@ -25,17 +25,17 @@ CODES = define(
         "PRT003": Code(
             "info",
             "places that the correction cannot bring within the tolerance",
-            meaning="These places of the part stay out of tolerance for the reason that the message states.",
+            meaning="These places of the part are out of tolerance, and the message states why.",
             consequence="The part keeps the error there that the page shows.",
             action="Let the path turn in air or with a radius, or allow the motion to be corrected.",
             example="A step aside of 0.6 mm between two rows: the force turns within less than the tool yields.",
         ),
         "PRT004": Code(
             "info",
-            "the material gives way",
-            meaning="At some places no position of the tool near the one before is at rest under its force.",
+            "engagement without equilibrium",
+            meaning="At some places no position of the tool near the one before is in equilibrium with its force.",
             consequence="The tool moves there at once; the error of the part is less certain near these places.",
-            action="Look at these places on the page; leave the material on a path that turns away slowly.",
+            action="Check these places on the page.",
             example="A slot whose front opens all at once where the tool leaves the blank.",
         ),
     }

@@ -47,7 +47,7 @@ _APART, _FAR = 1e-6, 3 * MM
 """[m] Places that are closer are one; inserted points that are farther apart have the usual places between."""
 
 UNSETTLED = 5e-6
-"""[m] Above it the material gives way: no place near the one before is at rest under the force that is met there."""
+"""[m] Above it no place near the one before is in equilibrium with the force that is met there."""
 
 _STEP, _LEVER = 10.0, 0.05
 """[N] by which the wrench is varied, and [m] by which moments are."""

@@ -144,7 +144,7 @@ class PartSide:
 class PartError:
     """The error of a part: ``figures``, the ``surface`` with its points that are ``own`` (K,) to the program, and the
     errors there as posted, and as compensated where it is.  wrenches: of both sides, of motions (K,) at shares (K,) the
-    wrench (K, 6), None where it is that of the task; unsettled (U,): motions at which the material gives way."""
+    wrench (K, 6), None where it is that of the task; unsettled (U,): motions with a place without equilibrium."""
 
     figures: PartFigures
     surface: Surface

@@ -50,8 +50,8 @@ def part_error_of(
     if len(part.unsettled):
         lines = task.toolpath.line[part.unsettled]
         message = (
-            f"the material gives way in {_lines(lines)}: the tool finds no rest near the place before, and the error of"
-            " the part is less certain where it moves at once"
+            f"no position of the tool near the one before is in equilibrium with its force at places of {_lines(lines)}:"
+            " the error of the part is less certain there"
         )
         findings += (Finding("PRT004", message, task.file, int(lines[0])),)
     return with_uncertainty(part, task, run, division, stated), findings
