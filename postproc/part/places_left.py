@@ -15,9 +15,7 @@ from postproc.part.part_figures import PartError, PartSide
 from postproc.process.stock.simulation import StockRun
 
 UNCORRECTED = "no correction is written for the motion"
-TURNS = (
-    "the path turns inside of the cut, and the force with it at once; the correction follows along a motion only"
-)
+TURNS = "the path turns inside of the cut, and the force with it at once; the correction follows along a motion only"
 CHANGES = "the force changes inside of the motion where the tool enters, leaves or meets a corner"
 
 

@@ -50,7 +50,7 @@ def part_error_of(
     if len(part.unsettled):
         lines = task.toolpath.line[part.unsettled]
         message = (
-            f"no position of the tool near the one before is in equilibrium with its force at places of {_lines(lines)}:"
+            f"no position of the tool near the one before is in equilibrium with its force in {_lines(lines)}:"
             " the error of the part is less certain there"
         )
         findings += (Finding("PRT004", message, task.file, int(lines[0])),)
