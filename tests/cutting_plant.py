@@ -15,12 +15,13 @@ from itertools import pairwise
 
 import numpy as np
 from numba import njit
+from scipy.optimize import root
 
 from postproc.base.geometry import vector_from_rotation
 
 KTC, KRC, KAC = 767.01, 168.8, 222.0  # N/mm2, EN AW-7075-T6
 KTE, KRE, KAE = 27.7, 26.6, 0.7  # N/mm
-STEP = 0.8  # along the path
+STEP = {1: 0.8, 2: 0.25}  # along the path: the ball's turns at once at the ends of rows
 RECENT = np.array([1, 2, 4, 8, 16])
 DOWN = np.diag([1.0, -1.0, -1.0])  # A 0, B 0, C 180
 BASE = np.array([1450.0, -100.0, 600.0])
@@ -250,7 +251,7 @@ def moves_of(text):
         end = np.array([at[letter] for letter in "XYZ"])
         if not set(given) & set("XYZ") or np.isnan(start).any() or np.isnan(end).any():
             continue
-        count = max(int(np.ceil(np.linalg.norm(end - start) / STEP)), 1)
+        count = max(int(np.ceil(np.linalg.norm(end - start) / STEP[tool])), 1)
         share = np.linspace(0, 1, count + 1)[:, None]
         points = start + share * (end - start)
         if code == 2:
@@ -258,7 +259,7 @@ def moves_of(text):
             ends = [np.arctan2(*(p[:2] - middle)[::-1]) for p in (start, end)]
             sweep = (ends[0] - ends[1]) % (2 * np.pi)
             radius = np.linalg.norm(start[:2] - middle)
-            count = int(np.ceil(radius * sweep / STEP))
+            count = int(np.ceil(radius * sweep / STEP[tool]))
             share = np.linspace(0, 1, count + 1)[:, None]
             angle = ends[0] - share[:, 0] * sweep
             points = start + share * (end - start)
@@ -337,7 +338,9 @@ class Machine:
             )
             if not cuts or turned:
                 self._end(chain)
-                chain = []
+                # where the path turns in the stock the tool goes on from where it is
+                goes_on = cuts and chain and np.linalg.norm(move.points[0] - self.tip) < 0.01
+                chain = chain[-1:] if goes_on else []
             before = step if cuts else None
             if cuts:
                 wrench = self._cut(move, chain, wrench)
@@ -394,7 +397,8 @@ class Machine:
         recent = [chain[-k] for k in RECENT if k <= len(chain)]
         recent = np.array([np.concatenate(one[1:]) for one in recent]).reshape(-1, 6)
         met, old_w, old_r = np.zeros(6), None, None
-        for _ in range(60):
+
+        def meet(wrench):
             moved = base + slope @ wrench
             at, axis = tip + moved[:3], np.array([0, 0, 1.0]) + np.cross(moved[3:], [0, 0, 1.0])
             axis = axis / np.linalg.norm(axis)
@@ -407,7 +411,11 @@ class Machine:
                 flat_force(self.wall, self.floor, recent, at, axis, own, radius, thick, teeth, met)
             else:
                 ball_force(self.field, at, axis, own, radius, thick, teeth, met)
-            rest = met - wrench
+            return met - wrench
+
+        first = wrench
+        for _ in range(60):
+            rest = meet(wrench)
             size = np.linalg.norm((slope @ rest)[:3])
             if size < SETTLED:
                 break
@@ -418,6 +426,15 @@ class Machine:
                 step = float(np.clip(-(u @ v) / max(u @ u, 1e-30), 0.1, 1.0))
             old_w, old_r = wrench, rest
             wrench = wrench + step * rest
+        if size > SETTLED * 100:
+            sizes = np.array([100, 100, 100, 1000, 1000, 1000.0])
+            for start in (first, wrench):
+                found = root(
+                    lambda x: meet(x * sizes) / sizes, start / sizes, options={"eps": 1e-6, "xtol": 1e-5}
+                )
+                other = np.linalg.norm((slope @ meet(found.x * sizes))[:3])
+                if other < size:
+                    size, wrench = other, found.x * sizes
         self.worst = max(self.worst, size)
         self.largest = max(self.largest, np.linalg.norm(wrench[:3]))
         return wrench, base + slope @ wrench

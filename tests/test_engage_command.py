@@ -306,6 +306,10 @@ def test_the_main_job_reports_the_error_of_the_part(folder):
     assert after["out_of_tolerance"] < 0.7 < 0.9 < before["out_of_tolerance"]
     beyond = max(after["gouge_max"], after["excess_max"]) > report["tolerance_mm"]
     assert [one["code"] for one in report["findings"]].count("PRT002") == beyond
+    # what stays beyond lies where the tool enters and leaves, and is said to
+    (left,) = [one for one in report["findings"] if one["code"] == "PRT003"]
+    assert "where the tool enters, leaves" in left["message"]
+    assert left["line"] in (5, 6)
     ply = (folder / "compensated" / "part.part.ply").read_bytes()
     head, _, body = ply.partition(b"end_header\n")
     vertices = int(head.split(b"element vertex ")[1].split()[0])

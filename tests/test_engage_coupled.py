@@ -1,4 +1,5 @@
-"""Engagement and displacement solved together, against the closed form of a wall under a spring."""
+"""Engagement and displacement solved together, against the closed form of a wall under a spring, and where a path turns
+at once."""
 
 from types import SimpleNamespace
 
@@ -95,3 +96,24 @@ def test_a_wall_under_a_spring_and_its_spring_passes(direction, compliance):
         assert row > 1 or yields > 0.005
         left = yields
     assert found.residual < 1e-6
+
+
+def test_where_the_path_turns_at_once_the_tool_turns_as_it_yields():
+    """A slot that turns by 90 deg: the force goes on as it is, and turns within some times the displacement.
+
+    The springs are the same in all directions: far from the corner both forces are the same to the feed."""
+    path = path_through(
+        [[30, 0, -DEPTH], [50, 0, -DEPTH], [50, 20, -DEPTH]], kinds=[Kind.PTP, Kind.LIN, Kind.LIN]
+    )
+    found = solve(path, block([0, -60, -40], [90, 60, 0]), np.diag([1e-6, 1e-6, 0.0]), FLAT)
+    before = found.along(np.array([1]), np.array([1.0]))[0, :2]
+    at = np.array([0.0, 0.1, 0.4, 2.0, 10.0])
+    after = found.along(np.full(len(at), 2), at / 20)[:, :2]
+    cosine = after @ before / np.linalg.norm(before) / np.linalg.norm(after, axis=1)
+    turned = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+    assert np.linalg.norm(before) / MM * 1e-6 > 0.05
+    assert turned[0] == pytest.approx(0, abs=1e-3)
+    assert turned[1] < 70
+    assert (np.diff(turned[:4]) > 0).all()
+    assert after[-1] == pytest.approx([-before[1], before[0]], rel=0.02)
+    assert not len(found.unsettled)

@@ -78,8 +78,8 @@ def test_the_part_as_posted_is_the_one_that_the_machine_cuts(reported):
 
 @pytest.mark.slow
 def test_the_part_as_written_is_the_one_that_the_machine_cuts(reported):
-    """Within some um, but at the rims of the wave; where the force steps at the ends of its rows the tool digs in by a
-    quarter of what it would if the correction followed the step (0.43 mm), and leaves more than is reported."""
+    """Within some um, but at the rims of the wave; where the path turns at once at the ends of its rows the tool turns
+    over some tenths of a millimetre, and leaves no more than is reported."""
     program, task, part = reported
     machine = cut(task, program.parent / "compensated/part.ngc")
     assert machine.worst < 0.1
@@ -92,7 +92,6 @@ def test_the_part_as_written_is_the_one_that_the_machine_cuts(reported):
     for name in ("wall", "floor"):
         assert np.abs(found[name][1]).max() < 0.03, name
     error, true = found["wave"]
-    assert true.min() > -0.11
-    assert true.max() < 0.16
-    assert error.min() > -0.14
-    assert np.percentile(np.abs(error - true), 99) < 0.07
+    assert true.min() > -0.05
+    assert 0.1 < true.max() < error.max() < 1.4 * true.max()
+    assert np.percentile(np.abs(error - true), 99) < 0.025

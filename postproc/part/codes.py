@@ -22,5 +22,21 @@ CODES = define(
             action="Use a larger corner radius at the worst place on the page, or end the pass in air.",
             example="A row of a ball end mill that ends in the stock with a step aside of 0.6 mm.",
         ),
+        "PRT003": Code(
+            "info",
+            "places that the correction cannot bring within the tolerance",
+            meaning="These places of the part are out of tolerance, and the message states why.",
+            consequence="The part keeps the error there that the page shows.",
+            action="Let the path turn in air or with a radius, or allow the motion to be corrected.",
+            example="A step aside of 0.6 mm between two rows: the force turns within less than the tool yields.",
+        ),
+        "PRT004": Code(
+            "info",
+            "engagement without equilibrium",
+            meaning="At some places no position of the tool near the one before is in equilibrium with its force.",
+            consequence="The tool moves there at once; the error of the part is less certain near these places.",
+            action="Check these places on the page.",
+            example="A slot whose front opens all at once where the tool leaves the blank.",
+        ),
     }
 )

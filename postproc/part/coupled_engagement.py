@@ -8,6 +8,7 @@ is linear in the wrench near the one that it is evaluated at; it is evaluated ag
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -17,11 +18,13 @@ from postproc.base.batches import each_block
 from postproc.base.geometry import lengths, turned
 from postproc.base.units import DEG, MM
 from postproc.compensation.mirror import pose_error
+from postproc.compensation.subdivision import Subdivision
+from postproc.part.deflected_sweeps import axes_of, tips_of
 from postproc.part.displacement import Displacements
 from postproc.process.stock.cells import build_stock
 from postproc.process.stock.coupled import AS_STRAIGHT, Nodes, Pieces, solve_pieces
 from postproc.process.stock.displaced import displaced_rows
-from postproc.process.stock.distance import ANGLE, AXIS, CUTTER, MODE, ROW, STEP, TIP_POINT, TURN
+from postproc.process.stock.distance import ANGLE, CUTTER, MODE, ROW, TURN
 from postproc.process.stock.engagement import laws_of, profiles_of
 from postproc.process.stock.simulation import StockRun
 
@@ -30,14 +33,28 @@ MOST_PIECES = 300_000
 SPACING, FINER = 0.5, 4
 """Radii of the cutter between two places, and how many times closer they are where the nominal cut changes."""
 
+CLOSE, AFTER, BEFORE = 0.25 * MM, 2 * MM, 1 * MM
+"""Places are as close near a vertex at which the path turns, up to so far after it and before it: there the tool turns
+over some tenths of a millimetre."""
+
+INSERTED = 0.5 * MM
+"""Places are as close between points that the correction inserts."""
+
 ENOUGH = 0.5e-6
 """[m] The linear displacement differs from that of the model by less at the solution."""
+
+_APART, _FAR = 1e-6, 3 * MM
+"""[m] Places that are closer are one; inserted points that are farther apart have the usual places between."""
+
+UNSETTLED = 5e-6
+"""[m] Above it no place near the one before is in equilibrium with the force that is met there."""
 
 _STEP, _LEVER = 10.0, 0.05
 """[N] by which the wrench is varied, and [m] by which moments are."""
 
 _JOINED, _SAME_WAY = 1e-9, 3 * DEG
-"""[m, rad] Motions that join as closely go on under the force with which the one before ends."""
+"""[m, rad] Motions that join as closely, with the spindle, go on under the force with which the one before ends; where
+the feed turns by more there is a vertex."""
 
 _ROUNDS = 3
 _ATTEMPTS, _NEARER = 8, 4
@@ -62,7 +79,7 @@ class CoupledEngagement:
 
     key (K,): twice the motion plus the share of its path, ascending; wrench (K, 6) [N, N m] in path axes; area (K,)
     [m2] removed across the feed; residual [m]: the largest difference between both displacements; pieces: the sweeps
-    from one place to the next.
+    from one place to the next; unsettled (U,): motions with a place at which both differ by more than ``UNSETTLED``.
     """
 
     key: Floats
@@ -70,6 +87,7 @@ class CoupledEngagement:
     area: Floats
     residual: float
     pieces: Paths
+    unsettled: Ints
 
     def along(self, motion: Ints, share: Floats) -> Floats:
         """(K, 6) [N, N m] the wrench at the shares (K,) of motions (K,); zero where nothing was solved."""
@@ -93,7 +111,7 @@ def solve_coupled(
 ) -> CoupledEngagement | str:
     """The engagement of ``paths`` with tools that ``displaced`` says, or why it is not known."""
     task = displaced.task
-    rows, owner, part = _pieces(run, paths)
+    rows, owner, part = _pieces(run, paths, displaced.division)
     if len(rows) > MOST_PIECES:
         return f"the program has {len(rows)} places to solve, at most {MOST_PIECES} are"
     motion, whole = paths.motion[owner], paths.share[owner]
@@ -132,19 +150,40 @@ def solve_coupled(
     assert solved is not None
     key, wrench, area = _by_motion(at_motion, at_share, wrench, solved.area, motion, share, fresh, start)
     pieces = Paths(rows, motion, share, paths.which[owner], paths.number[owner])
-    return CoupledEngagement(key, wrench, area, float(solved.residual.max()), pieces)
+    unsettled = np.unique(at_motion[solved.residual > UNSETTLED])
+    return CoupledEngagement(key, wrench, area, float(solved.residual.max()), pieces, unsettled)
 
 
-def _pieces(run: StockRun, paths: Paths) -> tuple[Floats, Ints, Floats]:
+def _pieces(run: StockRun, paths: Paths, division: Subdivision | None) -> tuple[Floats, Ints, Floats]:
     """Rows (P, ROW) of the pieces of sweeps, whose they are (P,), and their parts (P, 2)."""
     length = run.sweeps.length[paths.number]
     radius = np.array([cutter.radius for cutter in run.sweeps.cutters])[paths.which]
     uneven = np.isin(paths.number, run.engagement.uneven)
-    finer = np.where(uneven, FINER, 1)
-    count = np.maximum(np.ceil(length * finer / (SPACING * radius)), 1).astype(np.int64)
-    owner = np.repeat(np.arange(len(count)), count)
-    place = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    part = np.stack([place, place + 1], axis=1) / count[owner, None]
+    even = np.maximum(np.ceil(length * np.where(uneven, FINER, 1) / (SPACING * radius)), 1).astype(np.int64)
+    points = [_steps(np.zeros(len(length)), np.ones(len(length)), even)]
+    start, end = find_vertices(paths)
+    reach = length / np.maximum(length, 1e-12)
+    for at, low, high in (
+        (start, np.zeros(len(length)), np.minimum(AFTER / np.maximum(length, 1e-12), reach)),
+        (end, np.maximum(1.0 - BEFORE / np.maximum(length, 1e-12), 0.0), np.ones(len(length))),
+    ):
+        count = np.ceil((high - low) * length / CLOSE).astype(np.int64)
+        points.append(_steps(low, high, np.where(at, count, 0)))
+    if division is not None:
+        points.append(_inserted(paths, length, division))
+    owner, part = (np.concatenate(values) for values in zip(*points, strict=True))
+    order = np.lexsort((part, owner))
+    owner, part = owner[order], part[order]
+    # places that are as good as one are one, of which the ends of a sweep stay
+    kept = (part == 0.0) | (part == 1.0)
+    inner = np.minimum(part, 1.0 - part) * length[owner] > _APART
+    kept |= inner
+    owner, part = owner[kept], part[kept]
+    new = np.append(True, (owner[1:] != owner[:-1]) | ((part[1:] - part[:-1]) * length[owner[1:]] > _APART))
+    new |= (part == 1.0) & np.append(True, part[:-1] != 1.0)
+    owner, part = owner[new], part[new]
+    first = np.flatnonzero(owner[1:] == owner[:-1])
+    owner, part = owner[first], np.stack([part[first], part[first + 1]], axis=1)
     none = np.zeros((len(owner), 6))
     rows = displaced_rows(paths.rows[owner], part, none, none, 0.0)
     same = ~rows[:, TURN : TURN + 3].any(axis=1) | (paths.rows[owner, ANGLE] > 0)
@@ -152,18 +191,69 @@ def _pieces(run: StockRun, paths: Paths) -> tuple[Floats, Ints, Floats]:
     return rows, owner, part
 
 
+def _steps(low: Floats, high: Floats, count: Ints) -> tuple[Ints, Floats]:
+    """The sweeps (K,) and the shares (K,) of them that divide those from ``low`` to ``high`` (M,) by ``count`` (M,)."""
+    many = np.where(count > 0, count + 1, 0)
+    owner = np.repeat(np.arange(len(count)), many)
+    place = np.arange(len(owner)) - np.repeat(np.cumsum(many) - many, many)
+    share = place / np.maximum(count, 1)[owner]
+    part = low[owner] + share * (high - low)[owner]
+    return owner, np.where(share == 1.0, high[owner], part)
+
+
+def _inserted(paths: Paths, length: Floats, division: Subdivision) -> tuple[Ints, Floats]:
+    """Where the correction has points inside of the sweeps, and close places between those."""
+    own = np.flatnonzero(~division.transitions & (division.share > 0.0) & (division.share < 1.0))
+    at = (division.source + division.share)[own]
+    low = paths.motion + paths.share[:, 0]
+    wide = np.maximum(paths.share[:, 1] - paths.share[:, 0], 1e-12)
+    sweeps, parts = [np.zeros(0, np.int64)], [np.zeros(0)]
+    first, last = np.searchsorted(at, low), np.searchsorted(at, low + wide)
+    for k in np.flatnonzero(last > first).tolist():
+        ends = np.concatenate([[0.0], (at[first[k] : last[k]] - low[k]) / wide[k], [1.0]])
+        for begin, stop in pairwise(ends):
+            far = (stop - begin) * length[k]
+            count = int(np.ceil(far / INSERTED)) if far < _FAR else 1
+            parts.append(np.linspace(begin, stop, count + 1))
+            sweeps.append(np.full(count + 1, k))
+    return np.concatenate(sweeps), np.clip(np.concatenate(parts), 0.0, 1.0)
+
+
+def find_vertices(paths: Paths) -> tuple[Bools, Bools]:
+    """(M,) sweeps that start, and that end, where the path turns inside of a cut."""
+    rows = paths.rows
+    goes_on = _joined(rows, rows[:, CUTTER])
+    count = len(rows)
+    turns = goes_on & (_cosine(_directions(rows, 1.0)[:-1], _directions(rows, 0.0)[1:]) < np.cos(_SAME_WAY))
+    start, end = np.zeros(count, bool), np.zeros(count, bool)
+    start[1:], end[:-1] = turns, turns
+    return start, end
+
+
+def _joined(rows: Floats, tool: Floats) -> Bools:
+    """(P - 1,) sweeps ``rows`` (P, ROW) that end where the next one starts, with the same tool and spindle axis."""
+    one = np.ones(len(rows) - 1)
+    joined = lengths(tips_of(rows[1:], 0 * one) - tips_of(rows[:-1], one)) < _JOINED
+    axis = _cosine(axes_of(rows[:-1], one), axes_of(rows[1:], 0 * one))
+    return np.asarray(joined & (tool[1:] == tool[:-1]) & (axis > np.cos(_SAME_WAY)))
+
+
+def _directions(rows: Floats, share: float) -> Floats:
+    """(P, 3) the direction of the tip at ``share`` of sweeps, by a small step of them."""
+    step = 1e-4 if share == 0.0 else -1e-4
+    ends = [tips_of(rows, np.full(len(rows), at)) for at in (share, share + step)]
+    return np.asarray((ends[1] - ends[0]) * np.sign(step))
+
+
+def _cosine(one: Floats, other: Floats) -> Floats:
+    return np.asarray(np.sum(one * other, axis=1) / np.maximum(lengths(one) * lengths(other), 1e-30))
+
+
 def _starts(rows: Floats, motion: Ints, share: Floats) -> Bools:
-    """(P,) pieces that do not go on where the one before ends, in the same direction."""
+    """(P,) pieces that do not go on where the one before ends."""
     fresh = np.ones(len(rows), bool)
     within = (motion[1:] == motion[:-1]) & (np.abs(share[1:, 0] - share[:-1, 1]) < 1e-9)
-    tip, step = rows[:, TIP_POINT : TIP_POINT + 3], rows[:, STEP : STEP + 3]
-    lines = (rows[1:, ANGLE] == 0) & (rows[:-1, ANGLE] == 0) & (rows[1:, CUTTER] == rows[:-1, CUTTER])
-    joined = lines & (lengths(tip[1:] - tip[:-1] - step[:-1]) < _JOINED)
-    cosine = np.sum(step[1:] * step[:-1], axis=1)
-    joined &= cosine >= np.cos(_SAME_WAY) * lengths(step[1:]) * lengths(step[:-1])
-    axis = rows[:, AXIS : AXIS + 3]
-    joined &= np.sum(axis[1:] * axis[:-1], axis=1) > np.cos(_SAME_WAY)
-    fresh[1:] = ~(within | joined)
+    fresh[1:] = ~(within | _joined(rows, rows[:, CUTTER]))
     return fresh
 
 

@@ -75,8 +75,9 @@ def find_part_error(
     """The error of the part that ``task`` leaves in the stock of ``run``, at about ``count`` points.
 
     As posted, and with ``division`` as compensated: both with engagement and displacement solved together, unless
-    ``as_nominal`` says why the forces of the task are taken.  A correction follows the forces of the task, which are
-    even along a motion; what is met at entries, exits and corners is not.  PRT001 where it is not known, and why.
+    ``as_nominal`` says why the forces of the task are taken.  A correction follows the forces of the task, those of a
+    tool that goes as programmed; where the path turns at once no tool that yields does.  PRT001 where it is not
+    known, and why.
     """
     nominal = _nominal(run, count)
     if not len(nominal.own):
@@ -117,7 +118,10 @@ def find_part_error(
     )
     after = None if division is None else sides[1]
     wrenches = [None if isinstance(forces, str) else forces.along for forces in solved]
-    return PartError(figures, nominal.surface, nominal.own, sides[0], after, (wrenches[0], wrenches[-1]))
+    last = solved[-1]
+    unsettled = np.empty(0, np.int64) if isinstance(last, str) else last.unsettled
+    wrench = (wrenches[0], wrenches[-1])
+    return PartError(figures, nominal.surface, nominal.own, sides[0], after, wrench, unsettled)
 
 
 def _cut_forces(task: CompensationProblem, nominal: _Nominal, solved: CoupledEngagement | str) -> CutForces:

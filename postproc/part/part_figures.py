@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -144,7 +144,7 @@ class PartSide:
 class PartError:
     """The error of a part: ``figures``, the ``surface`` with its points that are ``own`` (K,) to the program, and the
     errors there as posted, and as compensated where it is.  wrenches: of both sides, of motions (K,) at shares (K,) the
-    wrench (K, 6), None where it is that of the task."""
+    wrench (K, 6), None where it is that of the task; unsettled (U,): motions with a place without equilibrium."""
 
     figures: PartFigures
     surface: Surface
@@ -152,6 +152,7 @@ class PartError:
     before: PartSide
     after: PartSide | None
     wrenches: tuple[WrenchAlong | None, WrenchAlong | None] = (None, None)
+    unsettled: Ints = field(default_factory=lambda: np.empty(0, np.int64))
 
     def vertex_errors(self, side: PartSide) -> Floats:
         """(V,) [m] the largest error, with its sign, around each vertex of the mesh; NaN where the blank is left."""

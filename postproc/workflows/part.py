@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from postproc.base.arrays import Ints
 from postproc.base.findings import Finding
 from postproc.base.units import MM
 from postproc.compensation.subdivision import Subdivision
 from postproc.part.part_figures import PartError
 from postproc.workflows.force_log import logged_force_findings
 from postproc.workflows.preparation import Prepared
+
+_MOST_LINES = 12
 
 
 def part_error_of(
@@ -30,7 +35,36 @@ def part_error_of(
     if isinstance(part, Finding):
         return None, (part,)
     stated = StatedIntervals(ready.cell.force_ci95, ready.cell.force_vector)
-    return with_uncertainty(part, task, run, division, stated), _beyond_tolerance(part, task.file)
+    findings = _beyond_tolerance(part, task.file)
+    if findings and division is not None:
+        from postproc.part.places_left import find_places_left
+
+        line = task.toolpath.line
+        for left in find_places_left(part, task, run, division):
+            kind = "an excess" if left.error > 0 else "a gouge"
+            message = (
+                f"{left.cause}: {100 * left.share:.2g} % of the surface stays out of tolerance for it"
+                f" ({_lines(line[left.motions])}), with {kind} of {abs(left.error) / MM:.3f} mm here"
+            )
+            findings += (Finding("PRT003", message, task.file, int(line[left.worst])),)
+    if len(part.unsettled):
+        lines = task.toolpath.line[part.unsettled]
+        message = (
+            f"no position of the tool near the one before is in equilibrium with its force in {_lines(lines)}:"
+            " the error of the part is less certain there"
+        )
+        findings += (Finding("PRT004", message, task.file, int(lines[0])),)
+    return with_uncertainty(part, task, run, division, stated), findings
+
+
+def _lines(lines: Ints) -> str:
+    """Lines (L,) in words, up to ``_MOST_LINES`` of them by number."""
+    lines = np.unique(lines)
+    if len(lines) == 1:
+        return f"line {lines[0]}"
+    if len(lines) <= _MOST_LINES:
+        return f"lines {', '.join(map(str, lines[:-1].tolist()))} and {lines[-1]}"
+    return f"{len(lines)} lines from {lines[0]} to {lines[-1]}"
 
 
 def _beyond_tolerance(part: PartError, file: str) -> tuple[Finding, ...]:

@@ -2,9 +2,15 @@
 
 At a place of the path the tool is displaced by d = b + S w under the wrench w, and w = W(d) is what it meets there: the
 equilibrium is the fixed point w = W(b + S w).  Places are solved in the order of the program, each in the stock that
-the displaced tools before it left.  Steps go along secants (Anderson, D. G., Iterative procedures for nonlinear
-integral equations, 1965, doi:10.1145/321296.321305, of depth 1); where these do not settle, as in a spring pass, whose
-force rises steeply with the first micrometres, the size of the wrench is bracketed along its direction.
+the displaced tools before it left.  The tool cuts in the direction in which it moves itself, from its place before to
+b + S w, and with the chip of its own speed: where the path turns it follows only as it yields.
+
+Steps go along secants (Anderson, D. G., Iterative procedures for nonlinear integral equations, 1965,
+doi:10.1145/321296.321305, of depth 1).  Where places are nearer to each other than the tool is displaced, a small
+change of the wrench turns the direction by much: there steps follow the derivative, damped (Marquardt, D. W., An
+algorithm for least-squares estimation of nonlinear parameters, 1963, doi:10.1137/0111030).  Where neither settles, as
+in a spring pass, whose force rises steeply with the first micrometres, the size of the wrench is bracketed along its
+direction.
 """
 
 from __future__ import annotations
@@ -18,7 +24,7 @@ from postproc.process.stock.cells import Stock
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.contact import COLUMNS, FORCE, NEAR_ZERO, RATE, find_contact, set_pose
 from postproc.process.stock.displaced import displace_row
-from postproc.process.stock.distance import CUTTER, rotated
+from postproc.process.stock.distance import CUTTER, rotated, speed_bound
 
 SETTLED, OF_DISPLACEMENT = 0.1e-6, 1e-3
 """A place is solved where the displacement by its wrench and the one that it was computed at differ by less: [m], and
@@ -31,6 +37,12 @@ AS_STRAIGHT = 1e-6
 """[m] A turn of the tool that moves its edges by less along a piece is taken by its mean."""
 
 _STEPS, _TURNS, _HALVINGS = 8, 3, 18
+_DAMPED, _TURNING = 24, 0.7
+"""Damped steps; and the share of the way from place to place by which the tool is displaced where it turns by much."""
+
+_VARIED = 3e-6  # m: by which a derivative looks aside, and as a share of the displacement:
+_VARIED_SHARE = 0.01
+_ALONG_SPINDLE = 0.0174524  # within a degree of it no direction across it is known
 
 
 class Pieces(NamedTuple):
@@ -74,7 +86,7 @@ def solve_pieces(stock: Stock, profiles: Floats, pieces: Pieces, nodes: Nodes, l
 
     profiles (T, E, 8): as of ``contacts``; lever [m]: how far from the tip a turn of the tool counts.
     """
-    pose = np.zeros((6, 3))
+    pose, came = np.zeros((6, 3)), np.zeros(4)
     first, last, whole = np.zeros(6), np.zeros(6), np.array([0.0, 1.0])
     for p in range(len(pieces.rows)):
         profile = profiles[int(pieces.rows[p, CUTTER])]
@@ -82,12 +94,14 @@ def solve_pieces(stock: Stock, profiles: Floats, pieces: Pieces, nodes: Nodes, l
         a, b = pieces.start[p], pieces.end[p]
         if pieces.fresh[p] > 0:
             set_pose(pieces.rows, p, 0.0, pieces.heading[p], pose)
-            _solve(stock, profile, pose, law, live, time, nodes, a, lever)
+            came[3] = 0.0
+            _solve(stock, profile, pose, came, law, live, time, nodes, a, a, lever)
+        _displacement(nodes, a, nodes.wrench[a], first)
+        came[:3], came[3] = first[:3], speed_bound(pieces.rows, p, 0.0)
         set_pose(pieces.rows, p, 1.0, pieces.heading[p], pose)
         if pieces.known == 0:
             nodes.wrench[b, :] = nodes.wrench[a]
-        _solve(stock, profile, pose, law, live, time, nodes, b, lever)
-        _displacement(nodes, a, nodes.wrench[a], first)
+        _solve(stock, profile, pose, came, law, live, time, nodes, a, b, lever)
         _displacement(nodes, b, nodes.wrench[b], last)
         displace_row(pieces.rows, p, whole, first, last, lever, AS_STRAIGHT, stock.sweeps[time])
 
@@ -117,10 +131,13 @@ def _size(slope: Floats, wrench: Floats, lever: float) -> float:
 
 @compiled
 def _met(
-    stock: Stock, profile: Floats, pose: Floats, law: Floats, live: Floats, time: int, nodes: Nodes, k: int,
-    wrench: Floats, moved: Floats, contact: Floats, out: Floats,
+    stock: Stock, profile: Floats, pose: Floats, came: Floats, law: Floats, live: Floats, time: int, nodes: Nodes,
+    k: int, wrench: Floats, moved: Floats, contact: Floats, out: Floats,
 ) -> float:  # fmt: skip
-    """``out`` (6,): the wrench that the tool meets where ``wrench`` (6,) displaces it to; the removed area [m2]."""
+    """``out`` (6,): the wrench that the tool meets where ``wrench`` (6,) displaces it to; the removed area [m2].
+
+    came (4,): displacement [m] from which the tool comes, and the length [m] of its path since, 0 where it is not
+    known."""
     d = np.zeros(6)
     _displacement(nodes, k, wrench, d)
     moved[:] = pose
@@ -129,6 +146,8 @@ def _met(
     for axis in range(1, 4):
         x, y, z = rotated(pose[axis, 0], pose[axis, 1], pose[axis, 2], d[3], d[4], d[5], 1.0)
         moved[axis, 0], moved[axis, 1], moved[axis, 2] = x, y, z
+    if came[3] > 0.0:
+        _set_own_velocity(profile, pose, came, moved)
     find_contact(stock, profile, moved, law, live, time, contact)
     out[:] = 0.0
     if contact[RATE] <= LEAST_AREA:
@@ -141,19 +160,60 @@ def _met(
 
 
 @compiled
+def _set_own_velocity(profile: Floats, pose: Floats, came: Floats, moved: Floats) -> None:
+    """``moved`` (6, 3), as of ``set_pose``, with the feed along the way that the tool goes itself, in parts of the
+    programmed speed; ``pose``: where it is not displaced.
+
+    Along the spindle a tool with a flat end keeps the programmed speed: what a displacement adds is thinner than its
+    edges are sharp, and all its end would rub."""
+    flat = profile[0, 1] == 0.0 and abs(profile[0, 5] - profile[0, 3]) < 1e-12
+    x, y, z = moved[1], moved[2], moved[3]
+    own, turn, heading = np.zeros(3), np.zeros(3), np.zeros(3)
+    along, square = 0.0, 0.0
+    for i in range(3):
+        own[i] = (moved[0, i] - pose[0, i] - came[i]) / came[3]
+        for axis in range(3):
+            own[i] += pose[4, axis] * pose[1 + axis, i]
+        turn[i] = moved[5, 0] * x[i] + moved[5, 1] * y[i] + moved[5, 2] * z[i]
+        along += own[i] * z[i]
+        square += own[i] * own[i]
+    size = 0.0
+    for i in range(3):
+        heading[i] = own[i] - along * z[i]
+        size += heading[i] * heading[i]
+    size = np.sqrt(size)
+    if size > _ALONG_SPINDLE * np.sqrt(square):
+        for i in range(3):
+            x[i] = heading[i] / size
+        y[0], y[1], y[2] = z[1] * x[2] - z[2] * x[1], z[2] * x[0] - z[0] * x[2], z[0] * x[1] - z[1] * x[0]
+    axial = moved[4, 2]
+    for axis in range(3):
+        a = moved[1 + axis]
+        moved[4, axis] = own[0] * a[0] + own[1] * a[1] + own[2] * a[2]
+        moved[5, axis] = turn[0] * a[0] + turn[1] * a[1] + turn[2] * a[2]
+    if flat:
+        moved[4, 2] = axial
+
+
+@compiled
 def _solve(
-    stock: Stock, profile: Floats, pose: Floats, law: Floats, live: Floats, time: int, nodes: Nodes, k: int,
-    lever: float,
+    stock: Stock, profile: Floats, pose: Floats, came: Floats, law: Floats, live: Floats, time: int, nodes: Nodes,
+    before: int, k: int, lever: float,
 ) -> None:  # fmt: skip
-    """The fixed point at node ``k``, from its wrench on."""
+    """The fixed point at node ``k``, from its wrench on, or from that of the node ``before``."""
     moved, contact = np.zeros((6, 3)), np.zeros(COLUMNS)
     slope = nodes.slope[k]
     w, g, g_before = np.zeros(6), np.zeros(6), np.zeros(6)
     r, r_before = np.zeros(6), np.zeros(6)
     w[:] = nodes.wrench[k]
     best = np.inf
-    for step in range(_STEPS):
-        area = _met(stock, profile, pose, law, live, time, nodes, k, w, moved, contact, g)
+    turning = (
+        max(_size(slope, w, lever), _size(slope, nodes.wrench[before], lever)) > _TURNING * came[3] > 0.0
+    )
+    if turning and _settle_turning(stock, profile, pose, came, law, live, time, nodes, before, k, lever):
+        return
+    for step in range(0 if turning else _STEPS):
+        area = _met(stock, profile, pose, came, law, live, time, nodes, k, w, moved, contact, g)
         r[:] = g - w
         size = _size(slope, r, lever)
         limit = SETTLED + OF_DISPLACEMENT * _size(slope, g, lever)
@@ -180,34 +240,140 @@ def _solve(
         r_before[:] = r
         w[:] = g - theta * (g - g_before)
         g_before[:] = g
-    _bracket(stock, profile, pose, law, live, time, nodes, k, lever)
+    _bracket(stock, profile, pose, came, law, live, time, nodes, k, lever)
+
+
+@compiled
+def _settle_turning(
+    stock: Stock, profile: Floats, pose: Floats, came: Floats, law: Floats, live: Floats, time: int, nodes: Nodes,
+    before: int, k: int, lever: float,
+) -> bool:  # fmt: skip
+    """The fixed point at node ``k`` by damped steps along the derivative of what remains by the force; whether it
+    settles.  The node keeps the best that was seen."""
+    moved, contact = np.zeros((6, 3)), np.zeros(COLUMNS)
+    slope = nodes.slope[k]
+    w, g, r = np.zeros(6), np.zeros(6), np.zeros(6)
+    trial, varied = nodes.wrench[before].copy(), np.zeros(6)
+    change, rest = np.zeros((6, 3)), np.zeros(3)
+    left, square = np.zeros((3, 3)), np.zeros((3, 3))
+    best, damping, fresh = np.inf, 1e-3, False
+    for start in range(2):  # from where the force was, or from where it is expected
+        if start == 1:
+            trial[:] = nodes.wrench[k]
+        area = _met(stock, profile, pose, came, law, live, time, nodes, k, trial, moved, contact, varied)
+        size = _size(slope, varied - trial, lever)
+        if size < best:
+            best, at_best = size, area
+            w[:], g[:] = trial, varied
+    for _ in range(_DAMPED):
+        nodes.wrench[k, :] = w
+        nodes.residual[k], nodes.area[k] = best, at_best
+        if best <= SETTLED + OF_DISPLACEMENT * _size(slope, g, lever):
+            return True
+        r[:] = g - w
+        if not fresh:
+            aside = _VARIED + _VARIED_SHARE * _size(slope, w, lever)
+            for j in range(3):
+                unit = np.sqrt(slope[0, j] ** 2 + slope[1, j] ** 2 + slope[2, j] ** 2)
+                change[:, j] = 0.0
+                if unit == 0.0:
+                    continue
+                trial[:] = w
+                trial[j] += aside / unit
+                _met(stock, profile, pose, came, law, live, time, nodes, k, trial, moved, contact, varied)
+                for i in range(6):
+                    change[i, j] = (varied[i] - g[i]) * unit / aside
+            fresh = True
+        # of the shifts: those by what remains, and their derivative by the force
+        for i in range(3):
+            rest[i] = 0.0
+            for m in range(6):
+                rest[i] += slope[i, m] * r[m]
+            for j in range(3):
+                left[i, j] = -slope[i, j]
+                for m in range(6):
+                    left[i, j] += slope[i, m] * change[m, j]
+        for i in range(3):
+            for j in range(3):
+                square[i, j] = 0.0
+                for m in range(3):
+                    square[i, j] += left[m, i] * left[m, j]
+        trace = square[0, 0] + square[1, 1] + square[2, 2]
+        if trace == 0.0:
+            return False
+        for i in range(3):
+            square[i, i] += damping * trace
+        force = _solved(square, -(left.T @ rest))
+        for i in range(3):
+            trial[i] = w[i] + force[i]
+            trial[3 + i] = g[3 + i]
+            for j in range(3):
+                trial[3 + i] += change[3 + i, j] * force[j]
+        area = _met(stock, profile, pose, came, law, live, time, nodes, k, trial, moved, contact, varied)
+        size = _size(slope, varied - trial, lever)
+        if size < best:
+            # a derivative that foretold well is used again
+            fresh = size < 0.3 * best
+            damping = max(0.1 * damping, 1e-9)
+            best, at_best = size, area
+            w[:], g[:] = trial, varied
+        elif damping > 1e3:
+            return False
+        else:
+            damping *= 10.0
+    return False
+
+
+@compiled
+def _solved(matrix: Floats, right: Floats) -> Floats:
+    """(3,) the solution of three equations, matrix (3, 3), by Cramer's rule."""
+    a, b, c = matrix[:, 0], matrix[:, 1], matrix[:, 2]
+    found = np.empty(3)
+    whole = _triple(a, b, c)
+    found[0], found[1], found[2] = (
+        _triple(right, b, c) / whole,
+        _triple(a, right, c) / whole,
+        _triple(a, b, right) / whole,
+    )
+    return found
+
+
+@compiled
+def _triple(a: Floats, b: Floats, c: Floats) -> float:
+    """The determinant of three columns (3,)."""
+    return float(
+        a[0] * (b[1] * c[2] - b[2] * c[1])
+        - b[0] * (a[1] * c[2] - a[2] * c[1])
+        + c[0] * (a[1] * b[2] - a[2] * b[1])
+    )
 
 
 @compiled
 def _bracket(
-    stock: Stock, profile: Floats, pose: Floats, law: Floats, live: Floats, time: int, nodes: Nodes, k: int,
-    lever: float,
+    stock: Stock, profile: Floats, pose: Floats, came: Floats, law: Floats, live: Floats, time: int, nodes: Nodes,
+    k: int, lever: float,
 ) -> None:  # fmt: skip
-    """The fixed point at node ``k`` where secants do not settle: the size of the wrench bracketed in its direction,
-    which then is turned."""
+    """The fixed point at node ``k`` where steps do not settle: the size of the wrench bracketed in its direction,
+    which then is turned.  The node keeps what it has where this comes no closer."""
     moved, contact = np.zeros((6, 3)), np.zeros(COLUMNS)
     slope = nodes.slope[k]
     g, w, unit, inner = np.zeros(6), np.zeros(6), np.zeros(6), np.zeros(6)
-    best = np.inf
-    area = _met(stock, profile, pose, law, live, time, nodes, k, w, moved, contact, unit)
+    best = nodes.residual[k]
+    area = _met(stock, profile, pose, came, law, live, time, nodes, k, w, moved, contact, unit)
     for _ in range(_TURNS):
         square = _along(slope, unit, unit)
         full = _size(slope, unit, lever)
         if square == 0.0 or full <= SETTLED:
-            nodes.wrench[k, :] = unit
-            nodes.residual[k], nodes.area[k] = full, area
+            if full < best:
+                nodes.wrench[k, :] = unit
+                nodes.residual[k], nodes.area[k] = full, area
             return
         low, high, widening = 0.0, 1.0, True
         inner[:] = unit
         for _ in range(_HALVINGS):
             scale = high if widening else 0.5 * (low + high)
             w[:] = scale * unit
-            area = _met(stock, profile, pose, law, live, time, nodes, k, w, moved, contact, g)
+            area = _met(stock, profile, pose, came, law, live, time, nodes, k, w, moved, contact, g)
             size = _size(slope, g - w, lever)
             if size < best:
                 best = size
