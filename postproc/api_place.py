@@ -145,7 +145,7 @@ def assign(
 
 
 def stated_force(force: Force) -> str | None:
-    """As ``Request`` has it.  Raises ValueError where it is empty, TypeError where it is nothing that states a force."""
+    """As ``Request`` has it.  Raises ValueError where it is empty, TypeError where it states no force."""
     if force is False or force is None:
         return None
     if force is True:
