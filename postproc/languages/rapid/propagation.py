@@ -399,10 +399,12 @@ class Propagation:
         if after is None:
             self._leave_place(state)
             return
+        displaced = state.displaced
         state.take(after)
         self._change(tuple(argument for name, argument in shared if name in changed), state)
         if routine.handlers or b"TRYNEXT" in leaving_words(self._names.active[-1].handlers):
             self._lose_effects(routine.name, state)
+            state.displaced |= displaced
 
     def _note_reading(self, at: int, state: ProgramState) -> None:
         """The program reads where the robot is."""
