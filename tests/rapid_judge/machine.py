@@ -178,10 +178,8 @@ class Machine:
             self.left = int(self.random.integers(1, 40)) if stopped else most
             ended = False
             with contextlib.suppress(Halt, Fault):
-                try:
+                with contextlib.suppress(StartAgain):
                     self._call("main", {}, {})
-                except StartAgain:
-                    pass
                 ended = True
             found.append(self.done)
             if not ended:
@@ -488,7 +486,7 @@ class Machine:
                 self.force,
                 self.displaced,
                 self.wrist,
-            )  # fmt: skip
+            )
         )
 
     def _assign(self, i: int) -> int:
