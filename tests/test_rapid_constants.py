@@ -30,10 +30,10 @@ UNKNOWN = {
     "what an earlier run left": (f"n1:=kept;\n{MOVE}\nkept:=4;\nkept:=3;", ""),
     "a displacement of an earlier run": (f"{MOVE}\nPDispSet d;", ""),
     "another start of main": (f"{MOVE}\nn1:=5;\nIF di1=1 ExitCycle;\nn1:=2;", ""),
-    "a second name": ("sub n1;", f"PROC sub(INOUT num o)\no:=o+1;\n{MOVE}\nENDPROC"),
+    "a second name": ("n1:=2;\nsub n1;", f"PROC sub(INOUT num o)\no:=5;\n{MOVE}\nENDPROC"),
     "two parameters": (
-        "sub n1,n1;",
-        f"PROC sub(INOUT num o,INOUT num p)\no:=o+1;\n{MOVE.replace('n1', 'p')}\nENDPROC",
+        "n1:=2;\nsub n1,n1;",
+        f"PROC sub(INOUT num o,INOUT num p)\no:=5;\n{MOVE.replace('n1', 'p')}\nENDPROC",
     ),
     "a function that assigns": (
         f"VAR num n1:=1;\nkept:=f();\nsub;\nn1:=n1;\n{MOVE.replace('n1', '7')}",
