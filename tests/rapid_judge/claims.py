@@ -6,8 +6,13 @@ import judged_motions
 import numpy as np
 from judged_motions import other_numbers
 
+from postproc.base.geometry import Poses
 from postproc.languages.dialect import Program
+from postproc.toolpath import OrientationMode
 from rapid_judge.machine import Done, multiply, turn_vector
+
+NEAR = 1e-3
+"""[mm, 1] Numbers of single precision, computed several times, are as near."""
 
 
 def disagreements(program: Program, done: list[Done]) -> list[str]:
@@ -20,35 +25,49 @@ def _motion(program: Program, row: int, motion: Done, _: int) -> list[str]:
     wrong = []
     if motion.displaced:
         wrong.append("it is displaced")
+    if motion.word == "moveabsj":
+        if not np.allclose(np.degrees(path.axes[row]), motion.target[0], atol=NEAR):
+            wrong.append("other axes")
+        return wrong
     position, rotation = path.position[row] * 1e3, path.rotation[row]
-    if not np.allclose(position, motion.target[0], atol=1e-9):
+    if not np.allclose(position, motion.target[0], atol=NEAR):
         wrong.append(f"position {position} instead of {motion.target[0]}")
-    if not np.allclose(rotation, _matrix(motion.target[1]), atol=1e-9):
+    if not np.allclose(rotation, _matrix(motion.target[1]), atol=NEAR):
         wrong.append("another orientation")
     wrong += other_numbers(
         row, [("speed", path.feed, motion.speed), ("zone", path.approximation, motion.zone)]
     )
+    if path.orientation_control.mode[row] == (OrientationMode.VAR if motion.wrist else OrientationMode.JOINT):
+        wrong.append("another SingArea")
     tool = path.frames[path.tool[row]].pose
-    if tool is None or not np.allclose(tool.position * 1e3, motion.tool[1][0], atol=1e-9):
+    if motion.tool[0] is not True:
+        wrong.append("a tool on the robot")
+    elif tool is None or not _same(tool, motion.tool[1]):
         wrong.append("another tool")
     base = path.frames[path.base[row]]
     if isinstance(motion.wobj, str):
         if base.number != 0:
             wrong.append("a work object instead of wobj0")
+    elif motion.wobj[0] or not motion.wobj[1]:
+        wrong.append("a work object that stands still")
     else:
         user, inner = motion.wobj[3], motion.wobj[4]
         place = [a + b for a, b in zip(user[0], turn_vector(user[1], inner[0]), strict=True)]
-        if base.pose is None or not np.allclose(base.pose.position * 1e3, place, atol=1e-6):
+        if base.pose is None or not _same(base.pose, [place, multiply(user[1], inner[1])]):
             wrong.append("another work object")
-        elif not np.allclose(base.pose.rotation, _matrix(multiply(user[1], inner[1])), atol=1e-6):
-            wrong.append("a work object that is turned otherwise")
     if motion.via is not None and np.isfinite(path.arcs.sweep[row]):
         end = path.position[row]
         via = np.array(motion.via[0]) * 1e-3
         radius = np.linalg.norm(end - path.arcs.centre[row])
-        if abs(np.linalg.norm(via - path.arcs.centre[row]) - radius) > 1e-9:
+        if abs(np.linalg.norm(via - path.arcs.centre[row]) - radius) > 1e-3 * NEAR:
             wrong.append("its auxiliary point is not on the arc")
     return wrong
+
+
+def _same(pose: Poses, stated: list) -> bool:
+    return np.allclose(pose.position * 1e3, stated[0], atol=NEAR) and np.allclose(
+        pose.rotation, _matrix(stated[1]), atol=NEAR
+    )
 
 
 def _matrix(q) -> np.ndarray:

@@ -10,6 +10,8 @@ import math
 import re
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 TOKEN = re.compile(
     r"\s+|(?P<remark>!.*)|(?P<num>\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+)|(?P<name>[A-Za-z]\w*)|(?P<text>\"[^\"]*\")"
     r"|(?P<sign>:=|<>|<=|>=|.)"
@@ -18,12 +20,39 @@ FIELDS = {
     "robtarget": ["trans", "rot", "robconf", "extax"],
     "pos": ["x", "y", "z"],
     "orient": ["q1", "q2", "q3", "q4"],
+    "pose": ["trans", "rot"],
+    "tooldata": ["robhold", "tframe", "tload"],
+    "wobjdata": ["robhold", "ufprog", "ufmec", "uframe", "oframe"],
+    "mark": ["at", "up"],
 }
-PART = {"trans": "pos", "rot": "orient"}
+PART = {
+    "trans": "pos", "rot": "orient", "tframe": "pose", "uframe": "pose", "oframe": "pose", "at": "robtarget",
+}  # fmt: skip
+FIRST = frozenset((";", ":", "then", "do", "else"))
+CLOSED = frozenset(("endif", "endwhile", "endfor", "endtest", "endproc", "endfunc", "endtrap", "error"))
 
 
 class Halt(Exception):
     """The program ended, or ran long enough."""
+
+
+class StartAgain(Exception):
+    """ExitCycle."""
+
+
+class Fault(Exception):
+    """An error that a handler may take."""
+
+
+class Left(Exception):
+    """RETRY or TRYNEXT ends a handler."""
+
+
+@dataclass
+class Ref:
+    """A variable; parameters may share it."""
+
+    value: object
 
 
 @dataclass
@@ -40,10 +69,16 @@ class Done:
     wobj: list | str
     force: str | None
     displaced: bool
+    wrist: bool = False
 
 
 class Machine:
-    def __init__(self, text: str, random, most: int = 400) -> None:
+    """``rounds``: numbers have single precision; ``loose``: NOT a AND b is NOT (a AND b)."""
+
+    def __init__(self, text: str, random, most: int = 400, rounds: bool = False, loose: bool = False) -> None:
+        self.rounds, self.loose = rounds, loose
+        self.armed = False
+        self.depth = 0
         self.tokens = []
         for number, line in enumerate(text.split("\n"), 1):
             at, own = 0, []
@@ -58,26 +93,40 @@ class Machine:
         self.random, self.left = random, most
         self.done: list[Done] = []
         self.force = None
-        self.displaced = False
+        self.displaced = self.wrist = False
+        self.override = 1.0
         self.kinds: dict[str, str] = {}
-        self.world: dict[str, object] = {}
+        self.world: dict[str, Ref] = {}
+        self.own: dict[str, Ref] = {}
+        self.own_kinds: dict[str, str] = {}
         self.routines: dict[str, tuple[int, list]] = {}
-        self._module()
+        self.traps: list[str] = []
+        self._module(("const", "pers", "var"))
 
     # -- structure
-    def _module(self) -> None:
+    def _module(self, kinds: tuple[str, ...]) -> None:
+        """Declares data of some kinds, and finds the routines."""
         i = 0
         while i < len(self.tokens):
             word = self.tokens[i][1]
             if word in ("const", "pers", "var"):
-                i = self._declare(i, self.world, self.kinds, [self.world])
-            elif word == "proc":
+                i = (
+                    self._declare(i, self.world, self.kinds, [self.world])
+                    if word in kinds
+                    else self._semicolon(i)
+                )
+            elif word == "trap":
+                self.traps.append(self.tokens[i + 1][1])
+                self.routines[self.tokens[i + 1][1]] = (i + 2, [])
+                i = self._end(i)
+            elif word in ("proc", "func"):
+                i += word == "func"
                 name = self.tokens[i + 1][1]
                 i += 3
                 parameters = []
                 while self.tokens[i][1] != ")":
                     mode = ""
-                    if self.tokens[i][1] == "inout":
+                    if self.tokens[i][1] in ("inout", "pers", "var"):
                         mode = "inout"
                         i += 1
                     parameters.append((mode, self.tokens[i][1], self.tokens[i + 1][1]))
@@ -85,71 +134,100 @@ class Machine:
                     if self.tokens[i][1] == ",":
                         i += 1
                 self.routines[name] = (i + 1, parameters)
-                while self.tokens[i][1] != "endproc":
-                    i += 1
+                i = self._end(i)
             else:
                 i += 1
+
+    def _end(self, i: int) -> int:
+        """Where the routine around a token ends."""
+        while self.tokens[i][1] not in ("endproc", "endfunc", "endtrap"):
+            i += 1
+        return i
 
     def _declare(self, i: int, into: dict, kinds: dict, scopes: list) -> int:
         kind, name = self.tokens[i + 1][1], self.tokens[i + 2][1]
         i += 3
-        size = None
-        if self.tokens[i][1] == "{":
+        sizes = []
+        while self.tokens[i][1] in ("{", ","):
             size, i = self._value(i + 1, scopes)
-            i += 1
+            sizes.append(int(size))
+        i += bool(sizes)
         kinds[name] = kind
         if self.tokens[i][1] == ":=":
-            into[name], i = self._value(i + 1, scopes)
+            value, i = self._value(i + 1, scopes)
         else:
-            zero = {"num": 0.0, "pos": [0.0] * 3}.get(kind)
-            if kind == "robtarget":
-                zero = [[0.0] * 3, [0.0] * 4, [0.0] * 4, [0.0] * 6]
-            into[name] = zero if size is None else [zero] * int(size)
+            zero = [[0.0] * 3, [0.0] * 4, [0.0] * 4, [0.0] * 6]
+            value = {"robtarget": zero, "pos": [0.0] * 3, "mark": [zero, 0.0], "bool": False}.get(kind, 0.0)
+            for size in reversed(sizes):
+                value = [value] * size
+        into[name] = Ref(_copied(value))
         return i + 1
 
     # -- running
     def run(self, name: str = "main") -> list[Done]:
-        with contextlib.suppress(Halt):
+        with contextlib.suppress(Halt, StartAgain, Fault):
             self._call(name, {}, {})
         return self.done
 
-    def _call(self, name: str, own: dict, kinds: dict) -> dict:
+    def cycles(self, count: int, most: int = 150) -> list[list[Done]]:
+        """The motions of runs of main one after the other; some are stopped, and the next one starts from main."""
+        found = []
+        for _ in range(count):
+            self.done, self.own, self.own_kinds, self.force, self.depth = [], {}, {}, None, 0
+            stopped = self.random.random() < 0.4
+            self.left = int(self.random.integers(1, 40)) if stopped else most
+            ended = False
+            with contextlib.suppress(Halt, Fault):
+                with contextlib.suppress(StartAgain):
+                    self._call("main", {}, {})
+                ended = True
+            found.append(self.done)
+            if not ended:
+                self._module(("var",))
+                self.displaced, self.override, self.wrist, self.armed = False, 1.0, False, False
+        return found
+
+    def _call(self, name: str, own: dict, kinds: dict) -> object:
+        """Runs a routine; the value of RETURN."""
+        if self.depth > 20:
+            raise Halt
         start, _ = self.routines[name]
-        self.own, saved = own, getattr(self, "own", None)
-        self.own_kinds, saved_kinds = kinds, getattr(self, "own_kinds", None)
-        end = start
-        while self.tokens[end][1] != "endproc":
-            end += 1
+        saved = self.own, self.own_kinds
+        self.own, self.own_kinds = own, kinds
+        stop = self._end(start)
+        handler = next((i for i in range(start, stop) if self.tokens[i][1] == "error"), stop)
         labels = {
             self.tokens[i][1]: i + 2
-            for i in range(start, end)
+            for i in range(start, handler)
             if self.tokens[i + 1][1] == ":" and self.tokens[i][0] == "name" and self._starts(i)
         }
-        self._body(start, end, labels)
-        self.own, self.own_kinds = saved, saved_kinds
-        return own
+        self.depth += 1
+        try:
+            return self._body(start, handler, labels, None if handler == stop else (handler + 1, stop))
+        finally:
+            self.own, self.own_kinds = saved
+            self.depth -= 1
+
+    def _interrupt(self) -> None:
+        """A trap runs between two statements."""
+        if not self.armed or self.random.random() > 0.08:
+            return
+        self.armed = False
+        for name in self.traps:
+            self._call(name, {}, {})
+        self.armed = True
 
     def _starts(self, i: int) -> bool:
-        return self.tokens[i - 1][1] in (
-            ";",
-            ":",
-            ")",
-            "then",
-            "do",
-            "else",
-            "endif",
-            "endwhile",
-            "endfor",
-            "endtest",
-        ) or (self.tokens[i - 1][0] == "remark")
+        return self.tokens[i - 1][1] in FIRST | CLOSED | {")"} or self.tokens[i - 1][0] == "remark"
 
-    def _body(self, i: int, end: int, labels: dict) -> None:
+    def _body(self, i: int, end: int, labels: dict, handler: tuple[int, int] | None = None) -> object:
         """Runs from a token to the end of the routine; loops keep a stack of what they come back to."""
         stack: list[tuple] = []
         while i < end:
             self.left -= 1
             if self.left < 0:
                 raise Halt
+            self._interrupt()
             kind, word, line = self.tokens[i]
             if kind == "remark":
                 said = word[1:].strip()
@@ -190,7 +268,7 @@ class Machine:
                 if self.tokens[j][1] == "step":
                     step, j = self._value(j + 1)
                 hidden = self.own.get(name)
-                self.own[name] = first
+                self.own[name] = Ref(first)
                 if (last - first) * step < 0:
                     i = self._skip(j + 1, end, ("endfor",)) + 1
                     self._restore(name, hidden)
@@ -199,8 +277,8 @@ class Machine:
                     i = j + 1
             elif word == "endfor":
                 _, body, name, last, step, hidden = stack[-1]
-                self.own[name] += step
-                if (last - self.own[name]) * step >= 0:
+                self.own[name].value = self._kept(self.own[name].value + step)
+                if (last - self.own[name].value) * step >= 0:
                     i = body
                 else:
                     stack.pop()
@@ -212,13 +290,41 @@ class Machine:
             elif word in ("case", "default"):
                 i = self._skip(i + 1, end, ("endtest",)) + 1
             elif word == "goto":
-                i = labels[self.tokens[i + 1][1]]
+                i = self._jump(i, labels[self.tokens[i + 1][1]], stack)
             elif word == "return":
-                return
+                return None if self.tokens[i + 1][1] == ";" else self._value(i + 1)[0]
+            elif word == "exitcycle":
+                raise StartAgain
+            elif word in ("retry", "trynext"):
+                raise Left(word)
+            elif word == "raise":
+                raise Fault
             elif self.tokens[i + 1][1] == ":" and kind == "name":
                 i += 2
             else:
-                i = self._simple(i, line)
+                try:
+                    i = self._simple(i, line)
+                except Fault:
+                    if handler is None:
+                        raise
+                    try:
+                        self._body(*handler, {})
+                        return None
+                    except Left as how:
+                        i = i if how.args[0] == "retry" else self._semicolon(i)
+        return None
+
+    def _jump(self, i: int, to: int, stack: list[tuple]) -> int:
+        """Leaves the loops that the label is not in."""
+        while stack and not (stack[-1][1] <= to <= self._loop_end(stack[-1])):
+            left = stack.pop()
+            if left[0] == "for":
+                self._restore(left[2], left[5])
+        return to
+
+    def _loop_end(self, loop: tuple) -> int:
+        start = loop[1] if loop[0] == "for" else loop[1] + 1
+        return self._skip(start, len(self.tokens), ("endfor" if loop[0] == "for" else "endwhile",))
 
     def _restore(self, name: str, hidden) -> None:
         """The variable of a loop is there in it alone."""
@@ -258,8 +364,9 @@ class Machine:
             if depth == 0 and word in words:
                 return i
             if word == "if":
-                _, j = self._value(i + 1)
-                depth += self.tokens[j][1] == "then"
+                while self.tokens[i][1] not in ("then", ";"):
+                    i += 1
+                depth += self.tokens[i][1] == "then"
             elif word in ("while", "for", "test"):
                 depth += 1
             elif word in ("endif", "endwhile", "endfor", "endtest"):
@@ -274,38 +381,64 @@ class Machine:
 
     def _simple(self, i: int, line: int) -> int:
         word = self.tokens[i][1]
+        if word == "%":
+            name, j = self._value(i + 1)
+            self._call(name.lower(), {}, {})
+            return j + 2
+        if word == "connect":
+            return self._semicolon(i)
         following = self.tokens[i + 1][1]
         if following in (":=", "{", "."):
             return self._assign(i)
         required, options, j = self._arguments(i + 1)
-        if word in ("movel", "movej", "movec", "moveldo"):
+        if word in ("movel", "movej", "movec", "moveldo", "moveabsj"):
             self._move(word, line, required, options)
         elif word == "waittime" and self.done and (required[0][0] >= 0.2 or "inpos" in options):
             self.done[-1] = replace(self.done[-1], zone=0.0)  # too late to be planned ahead
+        elif word == "waitdi":
+            if "maxtime" in options and self.random.random() < 0.3:
+                raise Fault
+        elif word == "isignaldi":
+            self.armed = True
         elif word == "pdispset":
             self.displaced = True
         elif word == "pdispoff":
             self.displaced = False
+        elif word == "velset":
+            self.override = required[0][0] / 100
+        elif word == "speedrefresh":
+            self.override *= required[0][0] / 100
+        elif word == "singarea":
+            self.wrist = "wrist" in options
         elif word == "incr":
-            name = required[0][1][0][1]
-            scope = self.own if name in self.own else self.world
-            scope[name] += 1
+            variable = self._variable(required[0][1][0][1])
+            variable.value = self._kept(variable.value + 1)
+        elif word == "setdataval":
+            self.world[required[0][0]].value = required[1][0]
+        elif word == "callbyvar":
+            self._call(f"{required[0][0]}{int(required[1][0])}", {}, {})
         elif word in self.routines:
-            _, parameters = self.routines[word]
-            own, kinds = {}, {}
-            for (_, kind, name), (value, _) in zip(parameters, required, strict=True):
-                own[name], kinds[name] = value, kind
-            caller = self.own
-            after = self._call(word, own, kinds)
-            for (mode, _, name), (_, texts) in zip(parameters, required, strict=True):
-                if mode:
-                    scope = caller if texts[0][1] in caller else self.world
-                    scope[texts[0][1]] = after[name]
+            self._start(word, required)
         return j
+
+    def _variable(self, name: str) -> Ref:
+        return self.own[name] if name in self.own else self.world[name]
+
+    def _start(self, word: str, required: list) -> object:
+        """Calls a routine with arguments, of which some are the caller's own variables."""
+        own, kinds = {}, {}
+        for (mode, kind, name), (value, texts) in zip(self.routines[word][1], required, strict=True):
+            own[name] = self._variable(texts[0][1]) if mode else Ref(_copied(value))
+            kinds[name] = kind
+        return self._call(word, own, kinds)
+
+    def _kept(self, value):
+        """A number as the machine keeps it."""
+        return float(np.float32(value)) if self.rounds and isinstance(value, float) else value
 
     def _arguments(self, i: int):
         required, options = [], {}
-        while self.tokens[i][1] != ";":
+        while self.tokens[i][1] not in (";", ")"):
             if self.tokens[i][1] == "\\":
                 name = self.tokens[i + 1][1]
                 i += 2
@@ -334,12 +467,26 @@ class Machine:
 
         own = options.get("v")
         millimetres = own[0] if own else speed[0][0] if isinstance(speed[0], list) else None
+        if millimetres is not None:
+            millimetres *= self.override
         size = None
         if isinstance(zone[0], list):
             size = 0.0 if zone[0][0] is True else options["z"][0] if "z" in options else zone[0][1]
         wobj = named(options["wobj"]) if "wobj" in options else "wobj0"
         self.done.append(
-            Done(line, word, via, target[0], millimetres, size, named(tool), wobj, self.force, self.displaced)
+            Done(
+                line,
+                word,
+                via,
+                target[0],
+                millimetres,
+                size,
+                named(tool),
+                wobj,
+                self.force,
+                self.displaced,
+                self.wrist,
+            )
         )
 
     def _assign(self, i: int) -> int:
@@ -348,9 +495,10 @@ class Machine:
         path, kind = [], kinds.get(name, "num")
         i += 1
         while self.tokens[i][1] != ":=":
-            if self.tokens[i][1] == "{":
+            if self.tokens[i][1] in ("{", ","):
                 value, i = self._value(i + 1)
                 path.append(int(value) - 1)
+                i -= self.tokens[i][1] == ","
             else:
                 part = self.tokens[i + 1][1]
                 path.append(FIELDS[kind].index(part))
@@ -358,15 +506,23 @@ class Machine:
                 i += 1
             i += 1
         value, i = self._value(i + 1)
+        value = _copied(value)
         if path:
-            whole = _copied(scope[name])
+            whole = _copied(scope[name].value)
             inner = whole
             for step in path[:-1]:
-                inner = inner[step]
+                inner = self._item(inner, step)
+            self._item(inner, path[-1])
             inner[path[-1]] = value
             value = whole
-        scope[name] = value
+        scope[name].value = value
         return i + 1
+
+    @staticmethod
+    def _item(values: list, at: int):
+        if not 0 <= at < len(values):
+            raise Halt
+        return values[at]
 
     # -- values
     def _value(self, i: int, scopes: list | None = None):
@@ -380,9 +536,12 @@ class Machine:
         return value, i
 
     def _and(self, i, scopes):
+        if self.loose and self.tokens[i][1] == "not":
+            value, i = self._and(i + 1, scopes)
+            return not value, i
         value, i = self._compare(i, scopes)
         while self.tokens[i][1] == "and":
-            other, i = self._compare(i + 1, scopes)
+            other, i = (self._and if self.loose else self._compare)(i + 1, scopes)
             value = bool(value) and bool(other)
         return value, i
 
@@ -391,7 +550,7 @@ class Machine:
         sign = self.tokens[i][1]
         if sign in ("=", "<>", "<", ">", "<=", ">="):
             other, i = self._sum(i + 1, scopes)
-            one, two = float(value), float(other)
+            one, two = value, other
             value = {
                 "=": one == two, "<>": one != two, "<": one < two,
                 ">": one > two, "<=": one <= two, ">=": one >= two,
@@ -408,9 +567,11 @@ class Machine:
             sign = 1 if self.tokens[i][1] == "+" else -1
             other, i = self._product(i + 1, scopes)
             value = (
-                [a + sign * b for a, b in zip(value, other, strict=True)]
+                [self._kept(a + sign * b) for a, b in zip(value, other, strict=True)]
                 if isinstance(value, list)
-                else value + sign * other
+                else value + other
+                if isinstance(value, str)
+                else self._kept(value + sign * other)
             )
         return value, i
 
@@ -419,15 +580,17 @@ class Machine:
         while self.tokens[i][1] in ("*", "/"):
             sign = self.tokens[i][1]
             other, i = self._primary(i + 1, scopes)
-            value = value * other if sign == "*" else value / other
+            if sign == "/" and other == 0:
+                raise Halt
+            value = self._kept(value * other if sign == "*" else value / other)
         return value, i
 
     def _primary(self, i, scopes):
         kind, word, _ = self.tokens[i]
         if kind == "num":
-            return float(word), i + 1
+            return self._kept(float(word)), i + 1
         if kind == "text":
-            return word, i + 1
+            return word.strip('"'), i + 1
         if word == "[":
             items = []
             while self.tokens[i][1] != "]":
@@ -438,8 +601,11 @@ class Machine:
             value, i = self._value(i + 1, scopes)
             return value, i + 1
         if word == "not":
-            value, i = self._primary(i + 1, scopes)
+            value, i = self._compare(i + 1, scopes)
             return not value, i
+        if word in self.routines and self.tokens[i + 1][1] == "(":
+            required, _, i = self._arguments(i + 2)
+            return self._start(word, required), i
         if word in ("offs", "reltool"):
             return self._displaced(word, i + 2, scopes)
         if word in ("true", "false"):
@@ -447,17 +613,18 @@ class Machine:
         scope = next((one for one in scopes if word in one), None)
         if scope is None:
             return self._foreign(word), i + 1
-        value = scope[word]
+        value = scope[word].value
         type_name = (self.own_kinds if scopes and scope is scopes[0] and len(scopes) > 1 else self.kinds).get(
             word
         )
         i += 1
         while self.tokens[i][1] in ("{", "."):
             if self.tokens[i][1] == "{":
-                index, i = self._value(i + 1, scopes)
-                if not 1 <= index <= len(value) or index != int(index):
-                    raise Halt
-                value = value[int(index) - 1]
+                while self.tokens[i][1] != "}":
+                    index, i = self._value(i + 1, scopes)
+                    if not 1 <= index <= len(value) or index != int(index):
+                        raise Halt
+                    value = value[int(index) - 1]
                 i += 1
             else:
                 part = self.tokens[i + 1][1]

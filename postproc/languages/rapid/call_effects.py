@@ -1,29 +1,39 @@
-"""What calls in a routine reach, and what these assign, whatever the flow."""
+"""What calls in a routine reach, and what these change, whatever the flow."""
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Iterable, Set
+from itertools import chain
 from typing import NamedTuple
 
-from postproc.languages.rapid.declared_data import Usage
+from postproc.languages.core.row_facts import SPEAKS
+from postproc.languages.rapid.declared_data import Usage, walk
+from postproc.languages.rapid.instructions import DISPLACING, MODES
+from postproc.languages.rapid.program_state import VARYING, ProgramState
 from postproc.languages.rapid.syntax_tree import (
     Expression,
     FunctionCall,
+    Instruction,
     Name,
+    NotUnderstood,
     NumberLiteral,
+    Remark,
     Star,
+    Statement,
     StringLiteral,
 )
+from postproc.toolpath import ArcFrame, OrientationMode
 
 _ALONE = (Name, NumberLiteral, Star, StringLiteral)
 NO_CALLS: tuple[FunctionCall, ...] = ()
 
 
 class Reach(NamedTuple):
-    """``routines`` that a call may run, and the names that they assign."""
+    """``routines`` that a call may run, the names that they assign, and all in them."""
 
     routines: Set[bytes]
     assigned: Set[bytes]
+    mentioned: Set[bytes]
 
 
 class CallEffects:
@@ -38,20 +48,13 @@ class CallEffects:
         """Of a routine and those that it calls."""
         found = self._of.get(name)
         if found is None:
-            routines = self._reached(name)
-            assigned = set().union(*(self.usage.assigned_in.get(one, ()) for one in routines))
-            found = self._of[name] = Reach(routines, assigned)
+            routines = self.usage.reached([name])
+            assigned, mentioned = (
+                set().union(*(names.get(one, ()) for one in routines))
+                for names in (self.usage.assigned_in, self.usage.mentioned_in)
+            )
+            found = self._of[name] = Reach(routines, assigned, mentioned)
         return found
-
-    def _reached(self, name: bytes) -> set[bytes]:
-        seen: set[bytes] = set()
-        pending = [name]
-        while pending:
-            one = pending.pop()
-            if one not in seen:
-                seen.add(one)
-                pending += self.usage.calls.get(one, ())
-        return seen
 
     def calls_in(self, expression: Expression) -> tuple[FunctionCall, ...]:
         """The functions in an expression, which is one of the module for as long as this is."""
@@ -73,3 +76,45 @@ def _calls(expression: Expression) -> list[FunctionCall]:
         if isinstance(one, tuple) and not isinstance(one, _ALONE):
             pending += one
     return found
+
+
+class ModeChanges(NamedTuple):
+    """The instructions of routines that change how motions are meant, and whether comments on forces are in them."""
+
+    names: Set[bytes]
+    speaks: bool
+
+    def __bool__(self) -> bool:
+        return bool(self.names) or self.speaks
+
+    def lose(self, state: ProgramState, reason: bytes) -> None:
+        """What is in force where one of the routines may have run, or a part of it."""
+        names = self.names
+        if not names.isdisjoint(DISPLACING):
+            state.displaced |= {reason}
+        if not names.isdisjoint((b"VELSET", b"SPEEDREFRESH")):
+            state.override = None
+        if b"SINGAREA" in names:
+            state.orientation = OrientationMode.UNKNOWN
+        if b"CIRPATHMODE" in names:
+            state.arc = ArcFrame.UNKNOWN
+        if b"CONFL" in names:
+            state.checks_linear = None
+        if b"CONFJ" in names:
+            state.checks_joint = None
+        if self.speaks:
+            state.force = state.switch = VARYING
+
+
+def mode_changes(bodies: Iterable[tuple[Statement, ...]]) -> ModeChanges:
+    """Those of all statements."""
+    names: set[bytes] = set()
+    speaks = False
+    for one in chain.from_iterable(map(walk, bodies)):
+        if isinstance(one, Instruction):
+            names.add(one.name)
+        elif isinstance(one, NotUnderstood):
+            names |= one.names
+        elif isinstance(one, Remark):
+            speaks = speaks or SPEAKS.match(one.text) is not None
+    return ModeChanges(names & MODES, speaks)

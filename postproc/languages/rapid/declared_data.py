@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from postproc.languages.rapid.data_types import RECORDS, SPEEDS, ZONES, Components
 from postproc.languages.rapid.evaluation import Evaluator, Typed
-from postproc.languages.rapid.instructions import HARMLESS, MOTIONS, WRITERS, is_motion, sort_arguments
+from postproc.languages.rapid.instructions import (
+    ANY_PROCEDURE,
+    HARMLESS,
+    MOTIONS,
+    SETS_BY_NAME,
+    WRITERS,
+    is_motion,
+    sort_arguments,
+)
 from postproc.languages.rapid.motion_facts import is_direct
 from postproc.languages.rapid.parsing import declaration_at
 from postproc.languages.rapid.syntax_tree import (
@@ -24,6 +32,7 @@ from postproc.languages.rapid.syntax_tree import (
     NotUnderstood,
     PlainMotions,
     RapidRoutine,
+    StringLiteral,
 )
 from postproc.languages.rapid.values import FALSE, TRUE, GroupValue, Leaf, UnknownData, Value, number_of
 
@@ -74,8 +83,12 @@ class DeclaredData:
         return one
 
     def is_constant(self, name: bytes) -> bool:
+        return self.kind_of(name) == b"CONST"
+
+    def kind_of(self, name: bytes) -> bytes:
+        """CONST, PERS or VAR; b"" of a name that is not of the module."""
         declaration = self._declaration(name)
-        return declaration is not None and declaration.kind == b"CONST"
+        return b"" if declaration is None else declaration.kind
 
     def type_of(self, name: bytes) -> bytes:
         """The type of a name of the module, b"" of another one."""
@@ -131,8 +144,9 @@ def _zero(kind: bytes, evaluator: Evaluator, depth: int) -> Value:
 
 class Usage:
     """Names in the routines: ``assigned`` anywhere, ``later``: not shown by the flow, ``read``: otherwise than
-    as the point of a motion; ``calls``, ``assigned_in``: routine -> what it may call and assigns; ``moves``: routines
-    in which the robot may move."""
+    as the point of a motion; ``calls``, ``assigned_in``, ``mentioned_in``: routine -> what it may call, assigns, and
+    has in it; ``moves``: routines in which the robot may move; ``set_by_name``: data is set that a string names;
+    ``aside``: routines that traps and error handlers run."""
 
     def __init__(self, module: Module) -> None:
         self.assigned: set[bytes] = set()
@@ -140,9 +154,12 @@ class Usage:
         self.read: set[bytes] = set()
         self.calls: dict[bytes, set[bytes]] = {}
         self.assigned_in: dict[bytes, set[bytes]] = {}
+        self.mentioned_in: dict[bytes, set[bytes]] = {}
+        self.set_by_name = False
         self.moves: set[bytes] = set()
         self._called: set[bytes] = set()
         self._set: set[bytes] = set()
+        self._mentioned: set[bytes] = set()
         self._module_data = {declaration.name for declaration in module.declarations} | module.targets.keys()
         self._own = {routine.name for routine in module.routines}
         self._copying = {r.name for r in module.routines if not any(p.mode for p in r.parameters)}
@@ -150,20 +167,33 @@ class Usage:
             self._expressions(one.value, one.extent)
         for unclear in module.unclear:
             self.read |= unclear.names
+        aside = [routine.name for routine in module.routines if routine.kind == b"TRAP"]
         for routine in module.routines:
-            self._called, self._set = set(), set()
-            for statement in walk(routine.body):
-                self._statement(statement, routine)
-            if routine.kind == b"TRAP":
-                self.later |= self._set
-            own, self._set = self._set, set()
+            self._called, self._set, self._mentioned = set(), set(), set()
             for statement in walk(routine.handlers):
                 self._statement(statement, routine)
             self.later |= self._set
-            self._set |= own
+            aside += self._called
+            for statement in walk(routine.body):
+                self._statement(statement, routine)
             self.calls.setdefault(routine.name, set()).update(self._called)
             self.assigned_in.setdefault(routine.name, set()).update(self._set)
+            self.mentioned_in.setdefault(routine.name, set()).update(self._mentioned)
             self.assigned |= self._set
+        self.aside = self.reached(aside)
+        for name in self.aside:
+            self.later |= self.assigned_in.get(name, set())
+
+    def reached(self, names: Iterable[bytes]) -> set[bytes]:
+        """What calls of routines may run: these, and what they call."""
+        seen: set[bytes] = set()
+        pending = list(names)
+        while pending:
+            one = pending.pop()
+            if one not in seen:
+                seen.add(one)
+                pending += self._own if one.startswith(ANY_PROCEDURE) else self.calls.get(one, ())
+        return seen
 
     def _statement(self, statement: Any, routine: RapidRoutine) -> None:
         match statement:
@@ -177,12 +207,14 @@ class Usage:
                     target = target.base
                 if isinstance(target, Name):
                     self._set.add(target.name)
+                    self._mentioned.add(target.name)
                 self._expressions(statement.value)
             case Instruction():
                 self._instruction(statement, routine)
             case PlainMotions():
                 self._instruction(statement.first, routine)
             case NotUnderstood():
+                self._mentioned |= statement.names
                 if not is_motion(statement.first):
                     self._set |= statement.names
                 self.read |= statement.names
@@ -200,7 +232,9 @@ class Usage:
         points = () if sorted_arguments is None else sorted_arguments.points
         if is_motion(statement.name):
             self.moves.add(routine.name)
-        elif statement.name not in HARMLESS or statement.name in WRITERS:
+        elif statement.name in SETS_BY_NAME:
+            self._set_by_name(statement)
+        elif statement.name not in HARMLESS or statement.name in WRITERS or statement.name in self._own:
             self._called.add(statement.name)
             if statement.name not in self._copying:
                 self._set |= names_in(statement.arguments)
@@ -212,8 +246,17 @@ class Usage:
                 while isinstance(expression, Index):
                     self._expressions(*expression.indices)
                     expression = expression.base
+                self._mentioned |= names_in((argument,))
             else:
                 self._expressions(argument.value)
+
+    def _set_by_name(self, statement: Instruction) -> None:
+        name = statement.arguments[0].value if statement.arguments else None
+        if statement.name == b"SETDATAVAL" and isinstance(name, StringLiteral):
+            self.later.add(name.value.upper())
+            self._set.add(name.value.upper())
+        else:
+            self.set_by_name = True
 
     def _expressions(self, *values: Any) -> None:
         """Takes up the names of expressions, which are read, and functions, which are called."""
@@ -222,6 +265,7 @@ class Usage:
             one = pending.pop()
             if isinstance(one, Name):
                 self.read.add(one.name)
+                self._mentioned.add(one.name)
             elif isinstance(one, FunctionCall):
                 self._called.add(one.name)
                 pending += one.arguments

@@ -10,9 +10,11 @@ import numpy as np
 
 from postproc.base.geometry import rotation_from_abc, rotation_from_vector
 from postproc.base.units import DEG
+from postproc.languages.core.rounded_numbers import WHOLE, are_comparable
 from postproc.languages.rapid.data_types import RECORDS, Components
 from postproc.languages.rapid.quaternions import quaternion_from_rotation, rotation_from_quaternion
 from postproc.languages.rapid.syntax_tree import (
+    AND_AFTER_NOT,
     GOES_ON,
     SENSE,
     Aggregate,
@@ -44,6 +46,8 @@ from postproc.languages.rapid.values import (
 Typed = tuple[Value, bytes]
 """A value and its type, b"" where that is not known."""
 
+ROUNDED = "it is decided by how the controller rounds"
+
 _FUNCTIONS: dict[bytes, Callable[[float], float]] = {
     b"ABS": abs,
     b"SQRT": math.sqrt,
@@ -54,8 +58,6 @@ _FUNCTIONS: dict[bytes, Callable[[float], float]] = {
     b"ACOS": lambda x: math.acos(x) / DEG,
     b"ATAN": lambda x: math.atan(x) / DEG,
 }
-WHOLE = 2.0**23
-"""Whole numbers below it are exact in the numbers of the controller."""
 _COMPARISONS: dict[bytes, Callable[[float, float], bool]] = {
     b"<": lambda a, b: a < b,
     b">": lambda a, b: a > b,
@@ -164,6 +166,8 @@ class Evaluator:
         unknown = next((found for value in values if (found := unknown_in(value)) is not None), None)
         if unknown is not None:
             return unknown
+        if operator == AND_AFTER_NOT:
+            return UnknownData("AND after NOT has no brackets that say what NOT is of")
         if operator in (SENSE, GOES_ON):
             return _of_loop(values)
         if operator == b"NOT":
@@ -286,6 +290,8 @@ def _combined(operator: bytes, values: list[Value]) -> Value:
             return UnknownData("its value is not known")
         return Leaf(-number if operator == b"-" else number)
     if operator in (b"=", b"<>"):
+        if not _comparable(*values):
+            return UnknownData(ROUNDED)
         same = plain(values[0]) == plain(values[1])
         return TRUE if same == (operator == b"=") else FALSE
     one, other = (number_of(value) for value in values)
@@ -314,8 +320,18 @@ def _of_loop(values: list[Value]) -> Value:
     return TRUE if (last - at) * step >= 0 else FALSE
 
 
+def _comparable(one: Value, other: Value) -> bool:
+    """Whether it is known that two values are the same, or are not, in the numbers of the controller."""
+    if isinstance(one, GroupValue) and isinstance(other, GroupValue):
+        return all(_comparable(*pair) for pair in zip(one.items, other.items, strict=False))
+    numbers = number_of(one), number_of(other)
+    return numbers[0] is None or numbers[1] is None or are_comparable(numbers[0], numbers[1])
+
+
 def _of_numbers(operator: bytes, one: float, other: float) -> Value:
     if operator in _COMPARISONS:
+        if not are_comparable(one, other):
+            return UnknownData(ROUNDED)
         return TRUE if _COMPARISONS[operator](one, other) else FALSE
     if operator in (b"+", b"-", b"*"):
         value = one + other if operator == b"+" else one - other if operator == b"-" else one * other

@@ -6,6 +6,7 @@ import math
 import re
 
 from postproc.languages.rapid.syntax_tree import (
+    AND_AFTER_NOT,
     Aggregate,
     Argument,
     Component,
@@ -20,15 +21,13 @@ from postproc.languages.rapid.syntax_tree import (
 )
 from postproc.languages.rapid.tokens import NAME, NUMBER, SIGN, TEXT, Token, Tokens
 
-_LEVELS: tuple[frozenset[bytes], ...] = tuple(
-    frozenset(words)
-    for words in (
-        (b"OR", b"XOR"),
-        (b"AND",),
-        (b"=", b"<>", b"<", b">", b"<=", b">="),
-        (b"+", b"-"),
-        (b"*", b"/", b"DIV", b"MOD"),
-    )
+_RELATIONS = frozenset([b"=", b"<>", b"<", b">", b"<=", b">="])
+_LEVELS: tuple[frozenset[bytes], ...] = (
+    frozenset([b"OR", b"XOR"]),
+    frozenset([b"AND"]),
+    _RELATIONS,
+    frozenset([b"+", b"-"]),
+    frozenset([b"*", b"/", b"DIV", b"MOD"]),
 )
 _SUM = 3
 _NO_NAMES = frozenset(
@@ -103,6 +102,8 @@ class RapidExpressionParser:
         left = self._signed(level) if level == _SUM else self._level(level + 1)
         while self.next.kind in (SIGN, NAME) and self.next.text in _LEVELS[level]:
             operator = self.take().text
+            if operator == b"AND" and _ends_with_not(left):
+                operator = AND_AFTER_NOT
             right = self._level(level + 1)
             left = OperatorExpression(operator, (left, right), start, self.tokens.before)
         return left
@@ -134,7 +135,7 @@ class RapidExpressionParser:
             if self._depth >= DEEPEST:
                 raise SyntaxProblem
             self._depth += 1
-            operand = self._primary()
+            operand = self._level(_LEVELS.index(_RELATIONS))
             self._depth -= 1
             return OperatorExpression(b"NOT", (operand,), token.start, self.tokens.before)
         if token.kind == NAME and token.text not in _NO_NAMES:
@@ -219,3 +220,11 @@ class RapidExpressionParser:
             if separated and self.next.kind == SIGN and self.next.text == end:
                 raise SyntaxProblem
         return tuple(found)
+
+
+def _ends_with_not(operand: Expression) -> bool:
+    """Whether an operand is, or ends with, NOT and what it is of."""
+    if not isinstance(operand, OperatorExpression):
+        return False
+    last = operand.operands[-1] if operand.operator in (b"AND", AND_AFTER_NOT) else operand
+    return isinstance(last, OperatorExpression) and last.operator == b"NOT"

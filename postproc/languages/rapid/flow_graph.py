@@ -103,7 +103,7 @@ class FlowGraph:
                     self._jumps.append((self.blocks[-1], statement.name))
                     self._new()
                 case Leave():
-                    self.blocks[-1].follow = -2 if statement.ends else -1
+                    self.blocks[-1].follow = -1 if statement.word == b"RETURN" else -2
                     self._new()
                 case _:
                     self.blocks[-1].steps.append(statement)

@@ -110,6 +110,15 @@ PURE = frozenset(
 )
 """Functions of the controller that change nothing."""
 
+MODES = DISPLACING | {b"CONFL", b"CONFJ", b"SINGAREA", b"CIRPATHMODE", b"VELSET", b"SPEEDREFRESH"}
+"""Instructions after which motions are meant otherwise."""
+
+ANY_PROCEDURE = (b"%", b"CALLBYVAR")
+"""What a call starts with whose procedure is named by a string."""
+
+SETS_BY_NAME = frozenset([b"SETDATAVAL", b"SETALLDATAVAL"])
+"""Instructions that change data whose name is a string."""
+
 READERS = frozenset([b"CROBT", b"CJOINTT", b"CPOS", b"PDISPON", b"EOFFSON"])
 """What reads where the robot is."""
 

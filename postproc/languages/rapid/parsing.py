@@ -36,7 +36,7 @@ from postproc.languages.rapid.tokens import END, NAME, Tokens
 
 _KINDS = frozenset([b"CONST", b"PERS", b"VAR"])
 _HANDLERS = frozenset([b"ERROR", b"BACKWARD", b"UNDO"])
-_ENDS = frozenset([b"RAISE", b"EXIT", b"RETRY", b"TRYNEXT"])
+_ENDS = frozenset([b"RAISE", b"EXIT", b"EXITCYCLE", b"RETRY", b"TRYNEXT"])
 _CLOSING = frozenset(
     b"ENDPROC ENDFUNC ENDTRAP ENDIF ELSE ELSEIF ENDFOR ENDWHILE ENDTEST CASE DEFAULT ENDMODULE".split()
 )
@@ -157,7 +157,7 @@ class ModuleParser(RapidExpressionParser):
         while True:
             word = self._word()
             if word in _HANDLERS:
-                self.take()
+                handlers.append(Label(b"", self.take().start))
                 if self.sign(b"("):
                     while self.next.kind != END and not self.sign(b")"):
                         self.take()
@@ -262,7 +262,7 @@ class ModuleParser(RapidExpressionParser):
             self.take()
             value = None if self.next.text == b";" else self.expression()
             self.need(b";")
-            return Leave(value, word != b"RETURN", start)
+            return Leave(value, word, start)
         return self._simple(start)
 
     def _simple(self, start: int) -> Statement:

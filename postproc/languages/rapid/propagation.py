@@ -12,13 +12,13 @@ from dataclasses import replace
 
 from postproc.languages.core.motion_sources import Meeting, Source
 from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
-from postproc.languages.core.row_facts import SPEAKS
 from postproc.languages.core.waits import Waits
-from postproc.languages.rapid.call_effects import CallEffects
+from postproc.languages.rapid.call_effects import CallEffects, ModeChanges, mode_changes
 from postproc.languages.rapid.declared_data import DeclaredData, Usage, first_value, names_in, walk
 from postproc.languages.rapid.evaluation import Evaluator, is_component, unknown_record
 from postproc.languages.rapid.flow_graph import FlowGraph, Step
 from postproc.languages.rapid.instructions import (
+    ANY_PROCEDURE,
     DISPLACING,
     HARMLESS,
     MOTIONS,
@@ -31,7 +31,7 @@ from postproc.languages.rapid.instructions import (
     is_motion,
 )
 from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read, override_of, waits_at
-from postproc.languages.rapid.program_state import ELSEWHERE, START, ProgramState, same_values
+from postproc.languages.rapid.program_state import ELSEWHERE, START, ProgramState
 from postproc.languages.rapid.routine_names import RoutineNames
 from postproc.languages.rapid.routine_runner import RoutineRunner
 from postproc.languages.rapid.syntax_tree import (
@@ -40,21 +40,24 @@ from postproc.languages.rapid.syntax_tree import (
     DataDeclaration,
     Expression,
     Instruction,
+    Leave,
     Module,
     NotUnderstood,
     PlainMotions,
     RapidRoutine,
     Remark,
+    Statement,
 )
 from postproc.languages.rapid.values import UnknownData, Value, plain, replaced, truth_of
 from postproc.toolpath import ArcFrame, Kind, OrientationMode
 
 OTHER = MotionForm(Kind.OTHER)
 _SETTINGS = frozenset([b"TOOLDATA", b"WOBJDATA", b"SPEEDDATA", b"ZONEDATA"])
-_MODES = DISPLACING | {b"CONFL", b"CONFJ", b"SINGAREA", b"CIRPATHMODE", b"VELSET"}
 MOST_STEPS = 4_000_000
 """Statements that are followed; each statement of a file counts for four more."""
 NOT_CONSTANT = " is not constant: "
+MOST_RUNS = 8
+"""Runs of main after each other until all of them start with the same."""
 DEEPEST = 12
 """Calls in each other."""
 
@@ -64,13 +67,9 @@ def _length(statement: object) -> int:
     return len(statement) if isinstance(statement, PlainMotions) else 1
 
 
-def _sets_modes(routine: RapidRoutine) -> bool:
-    """Whether a routine changes how motions after it are meant."""
-    return any(
-        one.name in _MODES if isinstance(one, Instruction) else SPEAKS.match(one.text)
-        for one in walk(routine.body)
-        if isinstance(one, Instruction | Remark)
-    )
+def leaving_words(body: tuple[Statement, ...]) -> set[bytes]:
+    """RETURN and other words that leave statements, or start them again."""
+    return {one.word for one in walk(body) if isinstance(one, Leave)}
 
 
 class TooLong(Exception):
@@ -102,6 +101,11 @@ class Propagation:
         self._graphs: dict[bytes, FlowGraph] = {}
         self._effects = CallEffects(self.usage)
         self._names = RoutineNames(self.data, self.usage)
+        self._changes: dict[bytes, ModeChanges] = {}
+        aside = [self.routines[name].body for name in self.usage.aside if name in self.routines]
+        self._aside = mode_changes([*aside, *(routine.handlers for routine in module.routines)])
+        bodies = (body for routine in module.routines for body in (routine.body, routine.handlers))
+        self._restarts = any(b"EXITCYCLE" in leaving_words(body) for body in bodies)
         self._numbers = KeyNumbers()
         self._meetings: defaultdict[int, Meeting] = defaultdict(Meeting)
         self.rows = 0
@@ -139,26 +143,60 @@ class Propagation:
         state = ProgramState(PersistentMap(self._numbers), frozenset([START if is_main else ELSEWHERE]))
         for name in self.usage.assigned:
             if name in self.data and not self.data.is_constant(name):
-                shown = name.decode("latin-1")
-                value = self.data.look(name)[0] if is_main else UnknownData(f"{shown} is assigned elsewhere")
-                state.put(name, value)
-        if is_main and any(state.values.items()):  # main starts again with what its last run left
-            for _ in range(8):
-                self._runner.start()
-                after = self._routine(routine, state.copy(), False)
-                again = state.copy()
-                if after is not None:
-                    again.join(after, Meeting())
-                if same_values(again.values, state.values):
-                    break
-                state.values = again.values
-            else:
-                for name, _ in list(state.values.items()):
-                    state.put(name, UnknownData("it differs between runs"))
+                state.put(name, self._value_at_start(name, is_main))
+        if self._aside:
+            state.displaced |= {b"a trap or an error handler"}
+        if is_main:
+            self._start_again(routine, state)
         self._runner.start()
         end = self._routine(routine, state, True)
         if end is not None:
             self._leave_place(end)
+
+    def _value_at_start(self, name: bytes, is_main: bool) -> Value:
+        shown = name.decode("latin-1")
+        if not is_main:
+            return UnknownData(f"{shown} is assigned elsewhere")
+        if self.data.kind_of(name) == b"PERS":
+            return UnknownData(f"{shown} has at the start what an earlier run left")
+        return self.data.look(name)[0]
+
+    def _start_again(self, main: RapidRoutine, state: ProgramState) -> None:
+        """Takes in what the last run of main left, with which it starts again."""
+        changes = mode_changes(routine.body for routine in self.module.routines)
+        if not (any(state.values.items()) or changes.names):
+            return
+        for _ in range(0 if self._restarts else MOST_RUNS):
+            self._runner.start()
+            after = self._routine(main, state.copy(), False)
+            again = state.copy()
+            if after is not None:
+                self._leave_early(main, after)
+                again.join(after, Meeting())
+            again.last, again.waits = state.last, state.waits
+            again.force, again.switch = state.force, state.switch
+            if again.is_same(state):
+                return
+            state.take(again)
+        self._forget_all(self.usage.assigned, state)
+        changes._replace(speaks=False).lose(state, b"an earlier run")
+
+    def _leave_early(self, routine: RapidRoutine, state: ProgramState) -> None:
+        """What is not known after a routine that an error may end in the middle."""
+        if routine.handlers:
+            self._lose_effects(routine.name, state)
+
+    def _lose_effects(self, name: bytes, state: ProgramState) -> None:
+        """What calls of a routine may have done, or a part of it."""
+        reach = self._effects.of(name)
+        self._forget_all(reach.assigned, state)
+        found = self._changes.get(name)
+        if found is None:
+            routines = (self.routines[one] for one in reach.routines if one in self.routines)
+            found = self._changes[name] = mode_changes(routine.body for routine in routines)
+        found.lose(state, b"a routine")
+        if not reach.routines.isdisjoint(self.usage.moves):
+            self._leave_place(state)
 
     def _leave_place(self, state: ProgramState) -> None:
         """What the file does not contain goes on, or nothing does."""
@@ -197,6 +235,7 @@ class Propagation:
             case PlainMotions():
                 self._plain(step, state)
             case AssignmentStatement():
+                self._functions(step.target, state)
                 self._functions(step.value, state)
                 self._assign(step.target, self._evaluator(state).value(step.value), state)
             case DataDeclaration():
@@ -276,6 +315,8 @@ class Propagation:
         elif name == b"CIRPATHMODE":
             arcs = {frozenset([b"PATHFRAME"]): ArcFrame.PATH, frozenset([b"OBJECTFRAME"]): ArcFrame.BASE}
             state.arc = arcs.get(frozenset(options), ArcFrame.UNKNOWN)
+        elif name == b"SPEEDREFRESH":
+            state.override = None
         elif name == b"VELSET":
             state.override = override_of(step.arguments, self._evaluator(state))
         elif name in WRITERS:
@@ -315,10 +356,8 @@ class Propagation:
             self.calls.setdefault(step.name, step.start)
         self._change(step.arguments, state)
         state.waits = max(state.waits, Waits.MAYBE)
-        if step.name.startswith(b"%"):  # any procedure, those of this file among them
-            self._forget_all(self.usage.assigned, state)
-            if any(_sets_modes(one) for one in self.module.routines if one not in self._names.active):
-                state.displaced |= {b"a procedure whose name is computed"}
+        if step.name.startswith(ANY_PROCEDURE):  # those of this file among them
+            self._lose_effects(step.name, state)
         if moves:
             self._leave_place(state)
 
@@ -335,12 +374,13 @@ class Propagation:
         """Runs a routine of the file with its arguments."""
         if routine in self._names.active or len(self._names.active) >= DEEPEST or self.is_unclear(routine):
             self._unread_call(step, state, moves=True)
-            self._forget_all(self._effects.of(routine.name).assigned, state)
+            self._lose_effects(routine.name, state)
             return
         evaluator = self._evaluator(state)
         required = [argument for argument in step.arguments if not argument.name]
         named = {argument.name: argument for argument in step.arguments if argument.name}
         shared: list[tuple[bytes, Argument]] = []
+        changed = self._effects.of(routine.name).assigned
         inner = state.copy()
         for parameter in routine.parameters:
             argument = named.get(parameter.name)
@@ -353,13 +393,18 @@ class Propagation:
             inner.put(key, value)
             if parameter.mode and argument is not None:
                 shared.append((parameter.name, argument))
+        pairs = [(parameter, names_in((one,))) for parameter, one in shared]
+        self._names.find_aliases(routine, pairs, self._effects.of(routine.name))
         after = self._routine(routine, inner, self._runner.recording)
         if after is None:
             self._leave_place(state)
             return
+        displaced = state.displaced
         state.take(after)
-        changed = self._effects.of(routine.name).assigned
         self._change(tuple(argument for name, argument in shared if name in changed), state)
+        if routine.handlers or b"TRYNEXT" in leaving_words(self._names.active[-1].handlers):
+            self._lose_effects(routine.name, state)
+            state.displaced |= displaced
 
     def _note_reading(self, at: int, state: ProgramState) -> None:
         """The program reads where the robot is."""
@@ -367,18 +412,18 @@ class Propagation:
             self.reads[at] |= state.last
 
     def _forget_all(self, names: Set[bytes], state: ProgramState) -> None:
+        """Loses data of the module with names that other routines assign."""
         for name in names:
-            self._forget(name, state, "a function or a call may change it")
+            if name in self.data and not self.data.is_constant(name):
+                reason = f"{name.decode('latin-1')}: a function or a call may change it"
+                state.put(name, UnknownData(reason))
 
     def _functions(self, expression: Expression, state: ProgramState) -> None:
         """What the functions in an expression change: those of the program."""
         for one in self._effects.calls_in(expression):
-            if one.name not in PURE:
+            if one.name not in PURE or one.name in self.routines:
                 self._change(one.arguments, state)
-                reach = self._effects.of(one.name)
-                self._forget_all(reach.assigned, state)
-                if not reach.routines.isdisjoint(self.usage.moves):
-                    self._leave_place(state)
+                self._lose_effects(one.name, state)
             if one.name in READERS:
                 self._note_reading(one.start, state)
 

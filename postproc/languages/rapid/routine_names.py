@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+from postproc.languages.rapid.call_effects import Reach
 from postproc.languages.rapid.declared_data import DeclaredData, Usage, walk
 from postproc.languages.rapid.evaluation import Typed
 from postproc.languages.rapid.program_state import ProgramState
-from postproc.languages.rapid.syntax_tree import DataDeclaration, For, RapidRoutine
+from postproc.languages.rapid.syntax_tree import DataDeclaration, For, Goto, RapidRoutine
 from postproc.languages.rapid.values import UnknownData
 
 
 class RoutineNames:
-    """Of the routines that run; the last of ``active`` is the one whose statements are run."""
+    """Of the routines that run; the last of ``active`` is the one whose statements are run.  ``aliased``: keys of data
+    that has two names where one of them is assigned."""
 
     def __init__(self, data: DeclaredData, usage: Usage) -> None:
         self.active: list[RapidRoutine] = []
         self._data, self._usage = data, usage
+        self.aliased: set[bytes] = set()
         self._of: dict[bytes, dict[bytes, tuple[bytes, bytes]]] = {}
 
     def key(self, name: bytes) -> bytes:
@@ -29,8 +34,19 @@ class RoutineNames:
     def look(self, name: bytes, state: ProgramState) -> Typed:
         """Value and type of a name."""
         if name in self._usage.later:
-            return UnknownData(f"{name.decode('latin-1')} is assigned in a trap or an error handler"), b""
+            return UnknownData(f"{name.decode('latin-1')} is assigned where the flow does not show it"), b""
         key = self.key(name)
+        if key in self.aliased:
+            return UnknownData(
+                f"{name.decode('latin-1')} has a second name in a routine that changes it"
+            ), b""
+        if (
+            self._usage.set_by_name
+            and key == name
+            and name in self._data
+            and not self._data.is_constant(name)
+        ):
+            return UnknownData(f"{name.decode('latin-1')} may be set by SetDataVal"), b""
         value = state.values.get(key)
         if value is not None:
             return value, self._type(name, key)
@@ -38,17 +54,40 @@ class RoutineNames:
             return UnknownData(f"{name.decode('latin-1')} has no value yet"), b""
         return self._data.look(name)
 
+    def find_aliases(
+        self, routine: RapidRoutine, shared: Iterable[tuple[bytes, set[bytes]]], reach: Reach
+    ) -> None:
+        """Data that a routine, or what it calls, knows by two names, and changes by one of them; ``shared``: its
+        parameters that are data of the caller, and the names of these."""
+        before = routine.name + b"/"
+        other: dict[bytes, bytes] = {}
+        for parameter, names in shared:
+            for name in names:
+                key = self.key(name)
+                changed = not reach.assigned.isdisjoint((name, parameter))
+                if key in self.aliased or (key == name and name in reach.mentioned and changed):
+                    self.aliased |= {key, before + parameter}
+                if key in other and not reach.assigned.isdisjoint((parameter, other[key])):
+                    self.aliased |= {key, before + parameter, before + other[key]}
+                other[key] = parameter
+
     def _own(self, routine: RapidRoutine) -> dict[bytes, tuple[bytes, bytes]]:
         """The routine's own names -> key in the state, type."""
         names = self._of.get(routine.name)
         if names is None:
             before = routine.name + b"/"
             names = {one.name: (before + one.name, one.type) for one in routine.parameters}
+            loops: set[bytes] = set()
+            jumps = False
             for statement in walk(routine.body):
                 if isinstance(statement, DataDeclaration):
                     names[statement.name] = (before + statement.name, statement.type)
                 elif isinstance(statement, For):
-                    names[statement.name] = (before + statement.name, b"NUM")
+                    loops.add(statement.name)
+                jumps = jumps or isinstance(statement, Goto)
+            if jumps:  # it may leave a loop, whose variable is not the one of this name any more
+                self.aliased |= {names[name][0] for name in loops & names.keys()}
+            names |= {name: (before + name, b"NUM") for name in loops}
             self._of[routine.name] = names
         return names
 

@@ -99,6 +99,8 @@ Expression = (
 SENSE, GOES_ON = b"sense of a FOR", b"a FOR goes on"
 """Operators of what FOR does by itself: 1 or -1 of the first and the last value; whether a value is not beyond the last
 one."""
+AND_AFTER_NOT = b"AND after NOT"
+"""Operator of NOT a AND b: whether NOT is of a alone or of both is not stated alike everywhere."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,10 +228,11 @@ class Goto:
 
 @dataclass(frozen=True, slots=True)
 class Leave:
-    """RETURN, or with ``ends`` what ends the program or the error handler: EXIT, RAISE, RETRY, TRYNEXT."""
+    """``word``: RETURN, or what ends the program, its cycle or the error handler: EXIT, EXITCYCLE, RAISE, RETRY,
+    TRYNEXT."""
 
     value: Expression | None
-    ends: bool
+    word: bytes
     start: int
 
 
@@ -280,7 +283,8 @@ class RoutineParameter(NamedTuple):
 
 @dataclass(slots=True)
 class RapidRoutine:
-    """``kind``: PROC, FUNC or TRAP; ``handlers``: statements after ERROR, BACKWARD and UNDO; ``broken``: offset at
+    """``kind``: PROC, FUNC or TRAP; ``handlers``: statements after ERROR, BACKWARD and UNDO, each of which
+    an empty label precedes; ``broken``: offset at
     which its structure is not understood, -1 where it is."""
 
     kind: bytes

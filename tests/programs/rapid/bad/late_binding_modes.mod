@@ -1,4 +1,4 @@
-! RAP008 RAP010
+! RAP006 RAP010
 MODULE part
 PERS tooldata t:=[TRUE,[[0,0,200],[1,0,0,0]],[5,[0,0,80],[1,0,0,0],0,0,0]];
 PROC main()
