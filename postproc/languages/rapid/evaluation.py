@@ -167,7 +167,7 @@ class Evaluator:
         if unknown is not None:
             return unknown
         if operator == AND_AFTER_NOT:
-            return UnknownData("AND after NOT has no brackets that say what NOT is of")
+            return UnknownData("AND after NOT has no brackets: it is not known what NOT negates")
         if operator in (SENSE, GOES_ON):
             return _of_loop(values)
         if operator == b"NOT":

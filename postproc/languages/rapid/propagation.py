@@ -158,7 +158,7 @@ class Propagation:
         if not is_main:
             return UnknownData(f"{shown} is assigned elsewhere")
         if self.data.kind_of(name) == b"PERS":
-            return UnknownData(f"{shown} has at the start what an earlier run left")
+            return UnknownData(f"{shown} has at the start the value of an earlier run")
         return self.data.look(name)[0]
 
     def _start_again(self, main: RapidRoutine, state: ProgramState) -> None:
