@@ -13,7 +13,8 @@ from postproc.base.units import MM
 from postproc.compensation.problem import CompensationProblem
 from postproc.toolpath import Kind, Toolpath
 from postproc.verification.pairing import SAME
-from postproc.verification.simulator import PathSamples, Simulation, Simulator
+from postproc.verification.path_samples import PathSamples
+from postproc.verification.simulator import Simulation, Simulator
 
 SAME_TURN = 3e-5
 """[rad] Orientations that are the same as far as written digits go."""

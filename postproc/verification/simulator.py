@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
-from postproc.base.arrays import Bools, Floats, Ints, sums
+from postproc.base.arrays import Floats, Ints, sums
 from postproc.base.geometry import Poses, lengths, turn_between
 from postproc.base.units import MM
 from postproc.compensation.problem import CompensationProblem
 from postproc.toolpath import Kind
 from postproc.verification.pairing import SAME, Pairing
 from postproc.verification.path_grid import PathGrid
+from postproc.verification.path_samples import PathSamples, places_between
 from postproc.verification.run_path import RunPath
 from postproc.verification.tool_placement import PlacedTool, judged, place_tool
 
@@ -36,45 +36,8 @@ WORST, FINER = 12, 16
 """Motions with the largest errors, and in how many times as many parts as others they and their parabolas are
 divided."""
 
-
-@dataclass(frozen=True, eq=False)
-class PathSamples:
-    """S samples, in the order of the path.
-
-    stretch (S,), motion (S,): row of the program; share (S,) of its path; place: on the original; end (S,): the motion
-    ends here; first, last (S,): of a cut; distance_along (S,) [m]: from the sample before.
-    """
-
-    stretch: Ints
-    motion: Ints
-    share: Floats
-    place: PlacedTool
-    end: Bools
-    first: Bools
-    last: Bools
-    distance_along: Floats
-
-    @property
-    def distance(self) -> Floats:
-        """(S,) [m] of the tool from the wanted path; NaN where place and force do not agree."""
-        return np.where(self.place.settled, lengths(self.place.error), np.nan)
-
-    @cached_property
-    def weight(self) -> Floats:
-        """(S,) [m] of the program's path that each sample represents."""
-        half = 0.5 * np.append(self.distance_along, 0.0)
-        return half[:-1] + half[1:]
-
-    @property
-    def rms(self) -> float:
-        """[m] along the path"""
-        return float(np.sqrt(np.average(self.distance**2, weights=np.maximum(self.weight, 1e-12))))
-
-    def percentile(self, share: float) -> float:
-        """[m] the distance that this share of the path is below."""
-        order = np.argsort(self.distance)
-        total = np.cumsum(self.weight[order])
-        return float(self.distance[order][np.searchsorted(total, share * total[-1])])
+SEARCHES = 8
+"""How often it is looked between samples for a larger error than any of theirs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,6 +236,17 @@ class Simulator:
             samples = finer
             if max(change, mean) <= max(STILL, STILL_SHARE * float(new.max())):
                 break
+        # of the original alone, which nothing is judged by, that would take a third of the time
+        for _ in range(SEARCHES if run is not self.original else 0):
+            if not len(rows) or not samples.place.settled.all():
+                break
+            number, share = places_between(samples, rows)
+            if not len(number):
+                break
+            finer = self._with_more(run, path, (stretch, rows), samples, (rows[number], share))
+            change = abs(float(finer.distance.max() - samples.distance.max()))
+            change_angle = abs(float(finer.place.turn.max() - samples.place.turn.max()))
+            samples = finer
         return samples, change, change_angle
 
     def _sampled(
@@ -288,8 +262,42 @@ class Simulator:
         """Samples at the ends of ``parts`` (R,) even parts of the motions ``rows`` (R,), of ``halves`` (R,) even parts
         of the halves of parabolas on them, and where each stretch starts; those of ``coarser`` are not solved again."""
         opens = np.append(True, stretch[1:] != stretch[:-1])[: len(rows)]
+        return self._placed(run, path, (stretch, rows), path.shares(rows, parts, halves, opens), coarser)
+
+    def _with_more(
+        self,
+        run: CompensationProblem,
+        path: RunPath,
+        motions: tuple[Ints, Ints],
+        samples: PathSamples,
+        more: tuple[Ints, Floats],
+    ) -> PathSamples:
+        """``samples`` of the ``motions``, stretches (R,) and rows (R,), and those at shares (M,) of the rows (M,)
+        ``more``; the stretches of these alone are placed anew."""
+        stretch, rows = motions
+        some = np.isin(stretch, stretch[np.searchsorted(rows, more[0])])
+        stretch, rows = stretch[some], rows[some]
+        touched = np.isin(samples.stretch, stretch)
+        coarser = samples.at(np.flatnonzero(touched))
+        number = np.searchsorted(rows, np.append(coarser.motion, more[0]))
+        share = np.append(coarser.share, more[1])
+        order = np.lexsort((share, number))
+        finer = self._placed(run, path, (stretch, rows), (number[order], share[order]), coarser)
+        return samples.at(np.flatnonzero(~touched)).joined(finer)
+
+    def _placed(
+        self,
+        run: CompensationProblem,
+        path: RunPath,
+        motions: tuple[Ints, Ints],
+        at: tuple[Ints, Floats],
+        coarser: PathSamples | None,
+    ) -> PathSamples:
+        """Samples ``at`` numbers (S,) of the ``motions``, stretches (R,) and rows (R,), and shares (S,) of them."""
+        stretch, rows = motions
+        opens = np.append(True, stretch[1:] != stretch[:-1])[: len(rows)]
         closes = np.append(stretch[1:] != stretch[:-1], True)[: len(rows)]
-        number, share = path.shares(rows, parts, halves, opens)
+        number, share = at
         end = share == 1.0
         motion, where = rows[number], stretch[number]
         known = None if coarser is None else _among(coarser, rows, number, share)
