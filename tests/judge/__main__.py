@@ -45,6 +45,9 @@ def row(outcome: Outcome) -> str:
 
 def main(words: list[str]) -> int:
     failed, rule, package, count, seed = 0, "", PACKAGE, 0, 0
+    if "--help" in words:
+        print(__doc__)
+        return 0
     while words and words[0].startswith("--"):
         option, value, *words = words
         if option == "--rule":
