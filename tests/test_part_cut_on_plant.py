@@ -91,6 +91,9 @@ def test_the_part_as_written_is_the_one_that_the_machine_cuts(reported):
     # where the tool enters and leaves the correction follows
     for name in ("wall", "floor"):
         assert np.abs(found[name][1]).max() < 0.03, name
+    # also where the tool leaves a slot, and its own direction and force have no equilibrium
+    error, true = found["floor"]
+    assert np.percentile(np.abs(error - true), 99) < 0.02
     error, true = found["wave"]
     assert true.min() > -0.05
     assert 0.1 < true.max() < error.max() < 1.4 * true.max()

@@ -22,7 +22,7 @@ from postproc.compensation.subdivision import Subdivision
 from postproc.part.deflected_sweeps import axes_of, tips_of
 from postproc.part.displacement import Displacements
 from postproc.process.stock.cells import build_stock
-from postproc.process.stock.coupled import AS_STRAIGHT, Nodes, Pieces, solve_pieces
+from postproc.process.stock.coupled import AS_STRAIGHT, UNSETTLED, Nodes, Pieces, solve_pieces
 from postproc.process.stock.displaced import displaced_rows
 from postproc.process.stock.distance import ANGLE, CUTTER, MODE, ROW, TURN
 from postproc.process.stock.engagement import laws_of, profiles_of
@@ -45,9 +45,6 @@ ENOUGH = 0.5e-6
 
 _APART, _FAR = 1e-6, 3 * MM
 """[m] Places that are closer are one; inserted points that are farther apart have the usual places between."""
-
-UNSETTLED = 5e-6
-"""[m] Above it no place near the one before is in equilibrium with the force that is met there."""
 
 _STEP, _LEVER = 10.0, 0.05
 """[N] by which the wrench is varied, and [m] by which moments are."""

@@ -30,6 +30,12 @@ SETTLED, OF_DISPLACEMENT = 0.1e-6, 1e-3
 """A place is solved where the displacement by its wrench and the one that it was computed at differ by less: [m], and
 as a share of the displacement."""
 
+UNSETTLED = 5e-6
+"""[m] Above it no place near the one before is in equilibrium with the force that is met there."""
+
+LOST = 0.1
+"""Share of the displacement by the force above which what remains there is no place near the solution."""
+
 LEAST_AREA = 1e-11
 """[m2] Across the feed: below it nothing is cut."""
 
@@ -102,8 +108,25 @@ def solve_pieces(stock: Stock, profiles: Floats, pieces: Pieces, nodes: Nodes, l
         if pieces.known == 0:
             nodes.wrench[b, :] = nodes.wrench[a]
         _solve(stock, profile, pose, came, law, live, time, nodes, a, b, lever)
+        if came[3] > 0.0 and nodes.residual[b] > max(
+            UNSETTLED, LOST * _size(nodes.slope[b], nodes.wrench[b], lever)
+        ):
+            _solve_as_programmed(stock, profile, pose, law, live, time, nodes, a, b, lever)
         _displacement(nodes, b, nodes.wrench[b], last)
         displace_row(pieces.rows, p, whole, first, last, lever, AS_STRAIGHT, stock.sweeps[time])
+
+
+@compiled
+def _solve_as_programmed(
+    stock: Stock, profile: Floats, pose: Floats, law: Floats, live: Floats, time: int, nodes: Nodes,
+    before: int, k: int, lever: float,
+) -> None:  # fmt: skip
+    """The wrench of node ``k`` with the direction and the chip of the programmed feed, where its own have no
+    equilibrium; what remains of these stays its residual."""
+    rest, came = nodes.residual[k], np.zeros(4)
+    nodes.wrench[k, :] = nodes.wrench[before]
+    _solve(stock, profile, pose, came, law, live, time, nodes, before, k, lever)
+    nodes.residual[k] = rest
 
 
 @compiled
