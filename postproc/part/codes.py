@@ -34,7 +34,10 @@ CODES = define(
             "info",
             "engagement without equilibrium",
             meaning="At some places no position of the tool near the one before is in equilibrium with its force.",
-            consequence="The tool moves there at once; the error of the part is less certain near these places.",
+            consequence=(
+                "The tool moves there at once; where none is near it is taken to cut in the direction of the feed."
+                " The error of the part is less certain near these places."
+            ),
             action="Check these places on the page.",
             example="A slot whose front opens all at once where the tool leaves the blank.",
         ),
