@@ -119,7 +119,9 @@ def test_a_result_is_a_table_a_dictionary_and_a_few_words(at_samples):
 def test_the_other_commands_from_python(at_samples):
     path = "samples/kr270_taught/taught.src"
     done = postproc.verify(path, path, force=True)
-    assert done.original.error.max == done.compensated.error.max > 0
+    # it is looked more closely at what is judged
+    assert done.original.error.max == pytest.approx(done.compensated.error.max, rel=1e-3)
+    assert done.original.error.max > 0
     assert set(done.table()["program"]) == {"original", "compensated"}
     batched = postproc.batch("samples/kr270_taught", force=True, output="out", workers=1)
     assert list(batched.table()["state"]) == ["done"]

@@ -128,6 +128,8 @@ def test_surroundings_change_no_byte(job, languages, ending):
         assert [name for name in one if one[name] != made[0][name]] == []
 
 
+LOADS = Path(__file__).parents[1] / "samples" / "kr270_campaign" / "loads.csv"
+
 OTHERS = (
     ["predict", "part.src", "--force", "--report", "out"],
     ["verify", "part.src", "part.src", "--force", "--json", "out/verified.json"],
@@ -160,11 +162,7 @@ def test_another_time_user_and_machine_change_no_byte(tmp_path, words):
         (folder / "out").mkdir(parents=True)
         (folder / "cell.yaml").write_text(CELL)
         (folder / "part.src").write_text("\r\n".join(LINES))
-        rows = "".join(
-            f"{9 * k},{3 * k - 90},{60 + 9 * k},{8 * k},{45 - 9 * k},{k},{-300 * (k % 3)},{100 * k},0.0{k},0.1,-0.{k}\n"
-            for k in range(1, 10)
-        )
-        (folder / "loads.csv").write_text("# robot: kuka_kr270\nA1,A2,A3,A4,A5,A6,FZ,FX,DX,DY,DZ\n" + rows)
+        shutil.copy(LOADS, folder / "loads.csv")
         run([*words, "-q"], SURROUNDINGS[number], folder, *code)
         made.append(contents(folder / "out"))
     assert made[0]
@@ -189,11 +187,7 @@ def test_a_clock_set_back_makes_nothing_anew(tmp_path):
 def test_a_robot_file_says_its_day_and_nothing_else_of_the_time(tmp_path):
     """Which also shows that another time is another time."""
     made = []
-    rows = "".join(
-        f"{9 * k},{3 * k - 90},{60 + 9 * k},{8 * k},{45 - 9 * k},{k},{-300 * (k % 3)},{100 * k},0.0{k},0.1,-0.{k}\n"
-        for k in range(1, 10)
-    )
-    (tmp_path / "loads.csv").write_text("# robot: kuka_kr270\nA1,A2,A3,A4,A5,A6,FZ,FX,DX,DY,DZ\n" + rows)
+    shutil.copy(LOADS, tmp_path / "loads.csv")
     for code in ((), (ELSEWHEN,)):
         words = ["identify", "loads.csv", "--effects", "joint_compliance", "-o", "r.yaml", "-q"]
         run(words, SURROUNDINGS[0], tmp_path, *code)

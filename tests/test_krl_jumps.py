@@ -153,3 +153,12 @@ def test_a_label_forgets_what_changes_on_the_way_to_it(body: list[str], kept: bo
     path = read(body).toolpath
     last = len(HEAD) + len(body) - body[::-1].index(FULL)
     assert (path.base[path.line.tolist().index(last)] >= 0) == kept
+
+
+def test_a_way_out_of_a_loop_that_is_given_up_starts_elsewhere() -> None:
+    """Its rows are gone, and what comes from them is not."""
+    body = ["GOTO a", "LOOP", "IF $IN[1] THEN", "GOTO a", "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}", "IF $IN[1] THEN", "GOTO c",
+            "EXIT", "ENDIF", "IF $IN[1] THEN", "c:", "sub()", "ENDIF", "ENDIF", "ENDLOOP"]  # fmt: skip
+    path = read(body).toolpath
+    assert all(row < len(path) for rows in path.predecessors.values() for row in rows)
+    assert not path.continues.any()

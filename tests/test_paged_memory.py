@@ -149,6 +149,7 @@ def alone(test: Callable[..., None]) -> Callable[..., None]:
             test(**fixtures)
             return
         command = [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider"]
+        command += ["-m", "slow or not slow"]
         done = subprocess.run(
             [*command, f"{__file__}::{test.__name__}"],
             env=os.environ | {ALONE: "1"},

@@ -84,8 +84,8 @@ class PathSamples:
 
 
 def places_between(samples: PathSamples, rows: Ints) -> tuple[Ints, Floats]:
-    """Numbers among the motions ``rows`` (R,) and shares of them between samples where an error may be larger than the
-    largest of all: by as much as the samples beside are off the straight line between their neighbours."""
+    """Numbers (M,) among the motions ``rows`` (R,) and shares (M,) of them between samples where an error may be larger
+    than the largest of all: by as much as the samples beside are off the straight line between their neighbours."""
     number = np.searchsorted(rows, samples.motion)
     before, after = samples.distance_along, np.append(samples.distance_along[1:], 0.0)
     same = np.append(samples.stretch[1:] == samples.stretch[:-1], False)[: len(number)]  # as the next

@@ -64,7 +64,7 @@ def _few(rows: MotionRows, sources: frozenset[Source], many: set[Source]) -> set
             continue
         seen.add(source)
         if isinstance(source, int):
-            found.add(source)
+            found.add(_there(rows, source))
         else:
             todo.extend(rows.sources[source])
         if source in many or len(found) > MOST or len(seen) > _MARKS:
@@ -92,10 +92,15 @@ def expanded(rows: MotionRows, sources: Iterable[Source], seen: set[Source] | No
             continue
         seen.add(source)
         if isinstance(source, int):
-            found.add(source)
+            found.add(_there(rows, source))
         else:
             todo.extend(rows.sources[source])
     return found
+
+
+def _there(rows: MotionRows, row: int) -> int:
+    """The row; of a loop that was given up the rows are gone, and what starts there starts elsewhere."""
+    return row if row < len(rows) else ELSEWHERE
 
 
 def _distinct(sources: Iterable[Source], resolved: dict[bytes, set[int]]) -> set[int]:
