@@ -5,6 +5,7 @@ as many lines.
 """
 
 import contextlib
+import gc
 import importlib
 import multiprocessing
 import resource
@@ -365,6 +366,7 @@ def measure(case: Case, size: int, longest: int = LONGEST) -> Cost:
 
 def _measured(case: Case, size: int, longest: int, send) -> None:
     signal.setitimer(signal.ITIMER_PROF, longest)
+    gc.freeze()  # a collection would also visit, and copy, what the process that was forked held
     text = case.text(size)
     with tempfile.TemporaryDirectory() as name:
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
