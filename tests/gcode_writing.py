@@ -262,14 +262,14 @@ def _assert_turned(path: Toolpath, plan: Plan, before: Toolpath, writing: Writin
     oriented = (before.constraints.orientation_programmed & before.known)[plan.source]
     if not oriented.any():
         return
-    free_axis = before.orientation_control.redundant_axis[plan.source]
-    spins = oriented & np.isfinite(free_axis[:, 0])
+    redundant_axis = before.orientation_control.redundant_axis[plan.source]
+    spins = oriented & np.isfinite(redundant_axis[:, 0])
     # Half a step in each of three angles, or a little less of a vector's components.
     most = 3 * 0.5 * 10.0**-writing.deg * DEG * 1.01 + 1e-8
     whole = oriented & ~spins
     left = vector_from_rotation(np.swapaxes(path.rotation[whole], 1, 2) @ plan.rotation[whole])
     assert (np.linalg.norm(left, axis=1) <= most).all()
-    axis = free_axis[spins][..., None]
+    axis = redundant_axis[spins][..., None]
     apart = np.cross((path.rotation[spins] @ axis)[..., 0], (plan.rotation[spins] @ axis)[..., 0])
     assert (np.linalg.norm(apart, axis=1) <= most).all()
 

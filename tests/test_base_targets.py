@@ -87,7 +87,7 @@ def test_stated_base_targets_register_the_tracker(tmp_path):
     here = np.array([PLACES[n] for n in np.array(readings.targets)[readings.target][based]])
     there = readings.value[based]
     best, _ = Rotation.align_vectors(there - there.mean(0), here - here.mean(0))
-    turn = best.inv() * Rotation.from_matrix(found.point.given.frames.rotation[0])
+    turn = best.inv() * Rotation.from_matrix(found.point.nuisances.frames.rotation[0])
     assert turn.magnitude() < 2e-4
     assert np.linalg.norm(found.residual[based], axis=1).max() < 1e-4
 

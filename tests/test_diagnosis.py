@@ -13,7 +13,7 @@ from postproc.base.geometry import Poses
 from postproc.diagnosis.candidates import candidates, fewest_parameters, is_visible
 from postproc.diagnosis.decoys import AlternativeForm, decoys
 from postproc.diagnosis.diagnosis import diagnose
-from postproc.diagnosis.nonlinear_effects import evaluate_at_size, whole
+from postproc.diagnosis.nonlinear_effects import broyden_update, evaluate_at_size
 from postproc.diagnosis.residual_patterns import residual_patterns
 from postproc.diagnosis.search import SHARED, drop_confounded, limit_shared_scatter, model_unknowns, search
 from postproc.diagnosis.selection import complexity_penalty, counts, explained, problem
@@ -105,10 +105,10 @@ def test_what_can_not_be_seen_costs_nothing():
 def test_columns_of_a_whole_effect_foresee_it():
     rng = np.random.default_rng(3)
     columns, does, values = rng.normal(size=(7, 3, 2)), rng.normal(size=(7, 3)), np.array([0.5, -2.0])
-    np.testing.assert_allclose(whole(columns, does, values) @ values, does, atol=1e-12)
-    np.testing.assert_array_equal(whole(columns, does, 0 * values), columns)
+    np.testing.assert_allclose(broyden_update(columns, does, values) @ values, does, atol=1e-12)
+    np.testing.assert_array_equal(broyden_update(columns, does, 0 * values), columns)
     # what foresees it already is not changed
-    np.testing.assert_allclose(whole(columns, columns @ values, values), columns, atol=1e-12)
+    np.testing.assert_allclose(broyden_update(columns, columns @ values, values), columns, atol=1e-12)
 
 
 @pytest.mark.parametrize("times", [0.2, 10.0])
@@ -139,7 +139,7 @@ def test_an_effect_is_looked_at_as_large_as_it_is(times):
 def test_a_gain_of_the_force_is_a_softer_arm():
     campaign = campaign_of(stated(), 20, loads=(1200.0, 2600.0))
     base = fitted(campaign)
-    every = candidates(campaign, base.model, base.point.given)
+    every = candidates(campaign, base.model, base.point.nuisances)
     left = drop_confounded(base, replace(base.weights, shared=0.0), every)
     names = [
         {u.parameter.name for u in c.unknowns}
@@ -155,7 +155,7 @@ def test_a_gain_of_the_force_is_a_softer_arm():
 def test_differences_show_no_places():
     campaign = campaign_of(stated())
     base = fitted(campaign)
-    every = candidates(campaign, base.model, base.point.given)
+    every = candidates(campaign, base.model, base.point.nuisances)
     shown = {c.name for c in every if is_visible(c, base.weights)}
     assert {"gravity_compensator", "backlash", "link_compliance", "base_compliance"} <= shown
     assert not {"joint_offset", "transmission_error", "hysteresis", "thermal_growth"} & shown
@@ -176,7 +176,9 @@ def test_a_compensator_is_told_from_a_stiffness_that_varies():
     spring = StiffnessModel.from_robot(robot("kuka_kr270"))
     campaign = campaign_of(spring, 30, loads=(1200.0, 2600.0))
     base = fitted(campaign)
-    found = [c for c in candidates(campaign, base.model, base.point.given) if c.name == "gravity_compensator"]
+    found = [
+        c for c in candidates(campaign, base.model, base.point.nuisances) if c.name == "gravity_compensator"
+    ]
     (foil,) = decoys(base.model, campaign.readings.q, found[0])
     assert (foil.name, foil.joint) == ("joint_compliance", "A2")
     assert "varying with its angle" in foil.label

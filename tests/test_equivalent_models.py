@@ -95,7 +95,7 @@ def test_an_effect_at_its_limit_is_seen_and_a_third_of_it_is_not():
         (unknown,), (size,) = limit.candidate.shown, limit.parameters
         for share, words in ((1.0, seen), (0.3, unseen)):
             larger = limit.candidate.model.with_values({unknown.key: unknown.parameter.null + share * size})
-            campaign, given = Campaign(run.readings), result.final.point.given
+            campaign, given = Campaign(run.readings), result.final.point.nuisances
             there, here = (
                 campaign.expected(campaign.predicted(m), given)[0] for m in (larger, limit.candidate.model)
             )

@@ -80,7 +80,7 @@ def test_an_even_force_has_no_profile():
     even = np.outer(1 + 0.1 * share, np.arange(6.0))
     found = reduce_profiles(np.full(50, 7), share, even, np.full(50, 0.01))
     assert found.share.tolist() == [0.0, 1.0]
-    assert not len(found.bent().motion)
+    assert not len(found.piecewise().motion)
 
 
 def test_a_profile_of_an_arc_has_places_all_along_it():

@@ -224,8 +224,8 @@ def test_columns_are_filled_part_by_part() -> None:
         rows = FilledRows(20)
         for part in parts:
             rows.put(4, column=part, none=part[:, 0] * np.nan)
-        np.testing.assert_array_equal(rows.taken("column"), np.concatenate(parts))
-        assert not any(rows.taken("none").strides)
+        np.testing.assert_array_equal(rows.take_column("column"), np.concatenate(parts))
+        assert not any(rows.take_column("none").strides)
     empty = FilledRows(0)
     empty.put(0, column=np.empty((0, 3)))
-    assert empty.taken("column").shape == (0, 3)
+    assert empty.take_column("column").shape == (0, 3)

@@ -101,7 +101,7 @@ def test_rows_are_filled_part_by_part() -> None:
     for part in parts:
         rows.put(len(part["a"]), **part)
     for name, uniform in (("a", True), ("b", False), ("c", False), ("d", False)):
-        column = rows.taken(name)
+        column = rows.take_column(name)
         np.testing.assert_array_equal(column, np.concatenate([part[name] for part in parts]))
         assert (column.strides[0] == 0) == uniform
         assert not column.flags.writeable
@@ -112,7 +112,7 @@ def test_rows_whose_first_one_differs_are_kept() -> None:
         rows = FilledRows(4)
         rows.put(2, a=np.array(first))
         rows.put(2, a=np.array(second))
-        assert rows.taken("a").tolist() == first + second
+        assert rows.take_column("a").tolist() == first + second
 
 
 def test_words_of_blocks() -> None:
@@ -439,7 +439,9 @@ def test_a_vector_points_from_the_tip_to_the_spindle() -> None:
     values = np.array([[0, 0, 1], [1, 0, 0], [0, 3, 0], [0, 0, -2], [NAN, 0, 5], [0, 0, 0]], float)
     found = vector.rotation(values)
     np.testing.assert_allclose(
-        (found @ vector.free_axis)[:5], [[0, 0, 1], [1, 0, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]], atol=1e-12
+        (found @ vector.redundant_axis)[:5],
+        [[0, 0, 1], [1, 0, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]],
+        atol=1e-12,
     )
     assert np.isnan(found[5]).all()
     near = np.array([[0, 0, 2], [0, 0, 1], [NAN, NAN, NAN], [0, 0, 0.5], [0, 0, 0]], float)
@@ -450,7 +452,7 @@ def test_a_vector_points_from_the_tip_to_the_spindle() -> None:
     unknown = Vector((1, 2, 3), np.eye(3), None)
     assert np.isnan(unknown.rotation(values)).all()
     assert np.isnan(unknown.values(found, values)).all()
-    assert np.isnan(unknown.free_axis).all()
+    assert np.isnan(unknown.redundant_axis).all()
     assert unknown.writable(values).tolist() == [False] * 6
 
 
@@ -477,9 +479,9 @@ def test_where_angles_say_small_changes() -> None:
     assert nothing.writable(np.full((2, 3), 10.0)).tolist() == [False, False]
     assert np.isnan(nothing.rotation(np.zeros((2, 3)))).all()
     assert np.isnan(nothing.values(np.stack([np.eye(3)] * 2), np.zeros((2, 3)))).all()
-    assert np.isnan(nothing.free_axis).all()
-    assert np.isnan(ROTARY.free_axis).all()
-    assert HEAD.free_axis.tolist() == [0, 0, 1]
+    assert np.isnan(nothing.redundant_axis).all()
+    assert np.isnan(ROTARY.redundant_axis).all()
+    assert HEAD.redundant_axis.tolist() == [0, 0, 1]
 
 
 def test_angles_are_those_nearest() -> None:

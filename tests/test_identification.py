@@ -406,7 +406,7 @@ def test_nothing_more_can_be_taken_off_at_the_solution():
     found = fit(
         Campaign(replace(readings, sigma=np.full(len(readings), np.nan))), model, unknowns_of(model, term)
     )
-    matrix = np.concatenate([found.weights(part) for part in found.point.taken], axis=1)
+    matrix = np.concatenate([found.weights(part) for part in found.point.required_columns], axis=1)
     left = found.weights(found.point.residual)
     # the scale of the tracker, the last one, is held by what is known of trackers
     share = (matrix.T @ left / np.linalg.norm(matrix, axis=0))[:-1]
@@ -564,7 +564,7 @@ def test_along_what_is_only_seen_together_no_reading_moves(name):
     found = fit(campaign, model, unknowns)
     sums = [dropped for dropped in found.dropped if dropped.together]
     assert sums
-    here = campaign.points(campaign.predicted(found.model), found.point.given.places, campaign.at)
+    here = campaign.points(campaign.predicted(found.model), found.point.nuisances.places, campaign.at)
     for dropped in sums:
         moves = {}
         for hidden_name, share in ((dropped.name, 1.0), *((n, -w) for n, w in dropped.together)):
@@ -573,7 +573,7 @@ def test_along_what_is_only_seen_together_no_reading_moves(name):
             moves[unknown.key] = at + share * 50.0
         there, alone = (
             campaign.points(
-                campaign.predicted(found.model.with_values(m)), found.point.given.places, campaign.at
+                campaign.predicted(found.model.with_values(m)), found.point.nuisances.places, campaign.at
             )
             for m in (moves, dict([next(iter(moves.items()))]))
         )

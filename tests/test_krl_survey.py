@@ -308,10 +308,10 @@ def test_rows_are_taken_out_from_any_on() -> None:
     rows = MotionRows(Document(Path("a.src"), raw))
     state = motions.ModalState()
     rows.add(row(0), None)
-    assert rows.add_bulk(bulk, state, RowRefusal("KRL006", "why")) == 9
+    assert rows.add_vectorised(bulk, state, RowRefusal("KRL006", "why")) == 9
     rows.add(row(10), None)
     rows.add(row(11), None)
-    assert rows.add_bulk(bulk, state, None) == 20
+    assert rows.add_vectorised(bulk, state, None) == 20
     assert rows.ranges == [(1, 10, RowRefusal("KRL006", "why"))]
     for stop, chunks in (12, 3), (11, 3), (10, 2):
         rows.truncate(stop)

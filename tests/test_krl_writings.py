@@ -185,7 +185,7 @@ def test_what_stays_as_it_is_written() -> None:
     said = Components(own, np.array([[0, 1, 2, 1, 1, 1]]), none, none, none)
     np.testing.assert_allclose(said.half_step, [[0.5, 0.05, 0.005, 0.05, 0.05, 0.05]])
     change = np.array([[0.5, -0.0499, 0.0051, -359.96, 360.04, 0.051]])
-    assert said.kept(own + change).tolist() == [[True, True, False, True, True, False]]
+    assert said.unchanged(own + change).tolist() == [[True, True, False, True, True, False]]
     two = Components(
         np.vstack([own, own + 1]), *(np.vstack([part, part]) for part in (said.decimals, *[none] * 3))
     )

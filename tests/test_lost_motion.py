@@ -239,8 +239,8 @@ def test_a_correction_just_behind_a_reversal_is_that_of_the_new_side():
     there = job.simulated(rows, done.command, none, share=along, corrected=True).pose.position
     assert np.linalg.norm(there - goal.position, axis=1).max() < ROOM * job.tolerance
     # as it is programmed the motor has not crossed the gap there
-    assert abs(job.given(rows, along).direction[:, 1]).min() > 0.5
-    assert np.ptp(np.sign(job.given(rows, along).direction[:, 1])) == 0
+    assert abs(job.conditions_at(rows, along).direction[:, 1]).min() > 0.5
+    assert np.ptp(np.sign(job.conditions_at(rows, along).direction[:, 1])) == 0
 
 
 @pytest.mark.parametrize("process", [True, False])

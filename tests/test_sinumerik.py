@@ -328,8 +328,8 @@ def test_words_of_a_turned_tool(number: int) -> None:
     assert there.mean() > 0.8
     found = orientation.values(turned, values)
     again = orientation.rotation(found)
-    if np.isfinite(orientation.free_axis).all():
-        off = (again - turned) @ orientation.free_axis
+    if np.isfinite(orientation.redundant_axis).all():
+        off = (again - turned) @ orientation.redundant_axis
     else:
         off = (again - turned).reshape(200, -1)
     assert np.abs(off[there]).max() < 1e-8

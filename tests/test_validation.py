@@ -73,14 +73,14 @@ def test_a_held_out_residual_is_larger_than_a_fitted_one():
     case, found = absolute()
     campaign, poses = case.campaign, case.campaign.poses
     left = held_out(found, poses)
-    matrix = np.concatenate([found.weights(part) for part in found.point.taken], axis=1)
+    matrix = np.concatenate([found.weights(part) for part in found.point.required_columns], axis=1)
     q = np.linalg.svd(matrix / np.linalg.norm(matrix, axis=0), full_matrices=False)[0]
     for pose in range(poses):
         own = campaign.pose == pose
         part = q[np.repeat(own, 3)]
         expected = np.linalg.solve(np.eye(len(part)) - part @ part.T, found.point.residual[own].reshape(-1))
         # the frame that the residual is turned back by is another one by next to nothing
-        expected = campaign.in_base(_placed(expected, own), found.point.given)
+        expected = campaign.in_base(_placed(expected, own), found.point.nuisances)
         np.testing.assert_allclose(left[own], expected[own], atol=2e-3 * SIGMA)
     assert np.sum(left**2) > 1.05 * np.sum(found.residual**2)
 
@@ -102,7 +102,7 @@ def test_what_is_held_out_is_not_used():
     moved = case.campaign.shifted(by)
     after = held_out(fit(moved, *case[1:]), 4)
     # the residuals of absolute readings stand in axes of the base, those of the tracker's frame turned
-    back = found.point.given.frames.rotation[0].T
+    back = found.point.nuisances.frames.rotation[0].T
     np.testing.assert_allclose(after[fold == 1], (before + by @ back.T)[fold == 1], atol=0.02 * SIGMA)
     assert np.abs(after - before)[fold != 1].max() > 0.2 * SIGMA
 
@@ -167,7 +167,7 @@ def rms(residual):
 
 def test_other_readings_of_the_same_station_are_judged_from_it(fits):
     case, before, after = fits
-    result = validated(before, after, again(case, np.random.default_rng(5), after.point.given))
+    result = validated(before, after, again(case, np.random.default_rng(5), after.point.nuisances))
     assert not result.registered_anew
     assert rms(result.after) == pytest.approx(SIGMA, rel=0.25)
     assert rms(result.before) > 5.0 * SIGMA
@@ -176,7 +176,7 @@ def test_other_readings_of_the_same_station_are_judged_from_it(fits):
 def test_a_station_that_moved_is_registered_anew(fits):
     case, before, after = fits
     rng = np.random.default_rng(6)
-    given = replace(after.point.given, frames=somewhere(case.campaign, rng).frames)
+    given = replace(after.point.nuisances, frames=somewhere(case.campaign, rng).frames)
     result = validated(before, after, again(case, rng, given))
     assert result.registered_anew
     # six of 72 numbers are fitted
@@ -190,11 +190,11 @@ def test_a_station_of_another_name_is_another_station(fits):
     rng = np.random.default_rng(7)
     there = somewhere(case.campaign, rng).frames
     frames = type(there)(
-        np.concatenate([after.point.given.frames.rotation, there.rotation]),
-        np.concatenate([after.point.given.frames.position, there.position]),
+        np.concatenate([after.point.nuisances.frames.rotation, there.rotation]),
+        np.concatenate([after.point.nuisances.frames.position, there.position]),
     )
     words = {"session": np.arange(24) // 12, "sessions": ("", "evening")}
-    other = again(case, rng, replace(after.point.given, frames=frames), **words)
+    other = again(case, rng, replace(after.point.nuisances, frames=frames), **words)
     result = validated(before, after, other)
     assert result.registered_anew
     assert rms(result.after) == pytest.approx(SIGMA * np.sqrt(66 / 72), rel=0.25)
@@ -203,7 +203,7 @@ def test_a_station_of_another_name_is_another_station(fits):
 def test_targets_are_where_the_fit_found_them_by_their_names(fits):
     """In another order, and with one that moved."""
     case, before, after = fits
-    rng, given = np.random.default_rng(8), after.point.given
+    rng, given = np.random.default_rng(8), after.point.nuisances
     names = case.campaign.targets
     order = [2, 0, 1]
     words = {"targets": tuple(names[k] for k in order), "target": np.tile([1, 2, 0], 8)}
@@ -220,7 +220,7 @@ def test_targets_are_where_the_fit_found_them_by_their_names(fits):
 
 def test_a_new_target_is_found_from_the_new_readings(fits):
     case, before, after = fits
-    rng, given = np.random.default_rng(9), after.point.given
+    rng, given = np.random.default_rng(9), after.point.nuisances
     away = given.places.copy()
     away[2] += [5e-3, -0.1, 0.0]
     words = {"targets": (*case.campaign.targets[:2], "new")}

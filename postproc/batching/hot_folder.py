@@ -24,12 +24,13 @@ from postproc.batching.locking import locked
 from postproc.batching.programs import is_program
 from postproc.batching.records import STATE
 from postproc.cell import NAME as CELL
+from postproc.languages import COMPANION_SUFFIXES
 from postproc.output.atomic_write import write_atomically
 from postproc.report.batched import FAILED, Outcome
 
 ARCHIVE, REFUSED = "done", "failed"
 """Folders, in the hot one, of the programs that were compensated and of those that could not be."""
-COMPANIONS = (".dat", ".force.csv")
+COMPANIONS = (*COMPANION_SUFFIXES, ".force.csv")
 TRANSIENT = frozenset(["FIL001", "FIL010", "BAT008"])
 """Findings of a program that is still being written, or of a system that is short of something: it is tried again."""
 MISTAKES = frozenset(["FRC030"])

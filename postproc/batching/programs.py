@@ -83,7 +83,7 @@ def _claimed(anchor: Path, paths: list[Path]) -> ProgramMatches:
 
 
 def _belongs(path: Path, programs: set[Path]) -> bool:
-    """Whether a file is no program because it belongs to one: .dat, .force.csv, the cell."""
+    """Whether a file is no program because it belongs to one, as a force CSV does, or is the cell."""
     return path.name == CELL or path.with_name(path.name.partition(".")[0]) in programs
 
 

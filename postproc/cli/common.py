@@ -117,7 +117,7 @@ def tool_place(context: click.Context, option: click.Parameter, text: str | None
     return (*place, 0.0, 0.0, 0.0)[:6]
 
 
-def ending(*endings: str) -> Callable[[click.Context, click.Parameter, Path | None], Path | None]:
+def require_suffix(*endings: str) -> Callable[[click.Context, click.Parameter, Path | None], Path | None]:
     """A file of another kind is never overwritten by a result."""
 
     def check(_context: click.Context, _option: click.Parameter, path: Path | None) -> Path | None:
@@ -268,7 +268,7 @@ def readings_options(command: _Command) -> _Command:
                 "--output",
                 type=click.Path(path_type=Path, dir_okay=False),
                 metavar="NEW.yaml",
-                callback=ending(".yaml", ".yml"),
+                callback=require_suffix(".yaml", ".yml"),
                 help="Write a new robot file with the identified values [only report].",
             ),
             click.option(
@@ -289,7 +289,7 @@ def page_option(command: _Command) -> _Command:
         "--page",
         type=click.Path(path_type=Path, dir_okay=False),
         metavar="FILE.html",
-        callback=ending(".html"),
+        callback=require_suffix(".html"),
         help="Write the result as one HTML page that needs no network.",
     )(command)
 
@@ -303,7 +303,7 @@ def residual_options(command: _Command) -> _Command:
                 "csv_to",
                 type=click.Path(path_type=Path, dir_okay=False),
                 metavar="FILE.csv",
-                callback=ending(".csv"),
+                callback=require_suffix(".csv"),
                 help="The residual of every reading, one row each.",
             ),
             click.option("--strict", is_flag=True, help="Warnings count as errors: then nothing is written."),

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from postproc.cli.common import ROBOT, ending, language_options, tare_option
+from postproc.cli.common import ROBOT, language_options, require_suffix, tare_option
 from postproc.cli.decimal_option import Decimal
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
@@ -35,7 +35,7 @@ def comparison_options(command: _Command) -> _Command:
                 "--collisions",
                 type=click.Path(path_type=Path, dir_okay=False),
                 metavar="FILE.urdf",
-                callback=ending(".urdf"),
+                callback=require_suffix(".urdf"),
                 help="Check collisions of the arm with itself and with fixed bodies by these shapes [the robot file's "
                 "URDF].",
             ),

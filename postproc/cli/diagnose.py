@@ -9,9 +9,9 @@ import click
 from postproc.cli.common import (
     Numbers,
     Out,
-    ending,
     page_option,
     readings_options,
+    require_suffix,
     residual_options,
     result_options,
 )
@@ -24,7 +24,7 @@ from postproc.cli.decimal_option import Decimal
     "--next-poses",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.csv",
-    callback=ending(".csv"),
+    callback=require_suffix(".csv"),
     help="If two explanations fit alike: write a plan of poses that distinguish them [beside NEW.yaml].",
 )
 @click.option(
@@ -49,7 +49,7 @@ from postproc.cli.decimal_option import Decimal
     "--picture",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.png|svg",
-    callback=ending(".png", ".svg"),
+    callback=require_suffix(".png", ".svg"),
     help="Draw the gap per pose before and after, residual patterns, and the evidence per candidate.",
 )
 @page_option

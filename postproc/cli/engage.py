@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import ROBOT, Out, ending, language_options, result_options
+from postproc.cli.common import ROBOT, Out, language_options, require_suffix, result_options
 
 
 @click.command()
@@ -24,14 +24,14 @@ from postproc.cli.common import ROBOT, Out, ending, language_options, result_opt
     "csv_to",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.csv",
-    callback=ending(".csv"),
+    callback=require_suffix(".csv"),
     help="Engagement and force of every motion, one row each.",
 )
 @click.option(
     "--stock-out",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.stock",
-    callback=ending(".stock"),
+    callback=require_suffix(".stock"),
     help="What the program leaves of the blank, for the next program: stock: {from: FILE.stock}.",
 )
 @click.option("--strict", is_flag=True, help="Treat warnings as errors: then nothing is written.")

@@ -10,9 +10,9 @@ import click
 from postproc.cli.common import (
     Numbers,
     Out,
-    ending,
     page_option,
     readings_options,
+    require_suffix,
     residual_options,
     result_options,
 )
@@ -84,7 +84,7 @@ def _none_or(least: int) -> Callable[[click.Context, click.Parameter, int | None
     "--picture",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.png|svg",
-    callback=ending(".png", ".svg"),
+    callback=require_suffix(".png", ".svg"),
     help="Draw the residuals by joint, direction, load and order.",
 )
 @page_option

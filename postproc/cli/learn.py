@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import Out, ending, insertion_options, page_option, program_options
+from postproc.cli.common import Out, insertion_options, page_option, program_options, require_suffix
 from postproc.cli.decimal_option import Decimal
 
 
@@ -31,7 +31,7 @@ from postproc.cli.decimal_option import Decimal
     "--history",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.json",
-    callback=ending(".json"),
+    callback=require_suffix(".json"),
     help="Record of the parts of earlier runs, which count too [<stem>.parts.json beside the cell].",
 )
 @click.option(
@@ -57,7 +57,7 @@ from postproc.cli.decimal_option import Decimal
     "csv_to",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.csv",
-    callback=ending(".csv"),
+    callback=require_suffix(".csv"),
     help="Measured, explained and remaining deviation of every point, one row each.",
 )
 @page_option

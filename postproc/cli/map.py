@@ -6,7 +6,17 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import FAR, ROBOT, Numbers, Out, ending, number, numbers, page_option, result_options
+from postproc.cli.common import (
+    FAR,
+    ROBOT,
+    Numbers,
+    Out,
+    number,
+    numbers,
+    page_option,
+    require_suffix,
+    result_options,
+)
 
 
 def _range(_context: click.Context, _option: click.Parameter, text: str) -> Numbers:
@@ -77,7 +87,7 @@ def _range(_context: click.Context, _option: click.Parameter, text: str) -> Numb
     "--picture",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.png|svg",
-    callback=ending(".png", ".svg"),
+    callback=require_suffix(".png", ".svg"),
     help="Draw the map; for a box, slices along z.",
 )
 @page_option
@@ -86,7 +96,7 @@ def _range(_context: click.Context, _option: click.Parameter, text: str) -> Numb
     "csv_to",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.csv",
-    callback=ending(".csv"),
+    callback=require_suffix(".csv"),
     help="Write one row per cell.",
 )
 @result_options

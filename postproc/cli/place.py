@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from postproc.cli.common import FAR, Out, ending, number, page_option, result_options
+from postproc.cli.common import FAR, Out, number, page_option, require_suffix, result_options
 from postproc.cli.comparison_options import comparison_options
 from postproc.cli.decimal_option import Decimal
 
@@ -58,7 +58,7 @@ def _range_option(name: str, about: str) -> Callable[[_Command], _Command]:
     "--output",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="CELL.yaml",
-    callback=ending(".yaml", ".yml"),
+    callback=require_suffix(".yaml", ".yml"),
     help="Write the cell file with the best place, comments kept [only report].",
 )
 @click.option(
@@ -76,7 +76,7 @@ def _range_option(name: str, about: str) -> Callable[[_Command], _Command]:
     "--picture",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.png|svg",
-    callback=ending(".png", ".svg"),
+    callback=require_suffix(".png", ".svg"),
     help="Draw the objective over x and y, with the present and the best place.",
 )
 @page_option

@@ -12,10 +12,10 @@ from postproc.cli.common import (
     ROBOT,
     Numbers,
     Out,
-    ending,
     number,
     numbers,
     page_option,
+    require_suffix,
     result_options,
     tool_place,
 )
@@ -114,7 +114,7 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
     required=True,
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="PLAN.csv",
-    callback=ending(".csv"),
+    callback=require_suffix(".csv"),
     help="The plan: a file to fill in with readings, then the input of `identify`.",
 )
 @click.option(

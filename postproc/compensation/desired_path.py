@@ -174,7 +174,7 @@ def start_poses(
         if len(other):
             poses.put(other, poses[other] @ tool[before[other]].inverse() @ tool[rows[other]])
         if external is not None and (moved := np.flatnonzero(external.changes_carrier[rows])).size:
-            poses.put(moved, external.begin_from_end(rows[moved]) @ poses[moved])
+            poses.put(moved, external.start_from_end(rows[moved]) @ poses[moved])
         after_axes = np.flatnonzero(~path.known[before])
         after_axes = after_axes[np.isfinite(track.q[before[after_axes]]).all(axis=1)]
         if len(after_axes):

@@ -13,7 +13,7 @@ from postproc.base.geometry import Poses, lengths
 from postproc.base.units import DEG
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.desired_path import start_poses
-from postproc.compensation.orientations import spread
+from postproc.compensation.orientations import shares_between
 from postproc.compensation.path_error import PathSegments, path_errors, path_errors_at
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.subdivision import Limits
@@ -205,7 +205,7 @@ class DivisibleMotions:
     def _shares(self, rows: Ints, low: Floats, high: Floats, part: Floats) -> Floats:
         """(K,) the parts ``part`` (K,), 0 to 1, of what lies between the shares ``low`` and ``high`` (K,)."""
         if self.task.toolpath.orientation_control.any_by_words:
-            return spread(self.task.toolpath, rows, low, high, part)
+            return shares_between(self.task.toolpath, rows, low, high, part)
         return np.where(part == 1.0, high, low + part * (high - low))
 
     def commands(self, rows: Ints, share: Floats, where: str = "between its points") -> Poses:

@@ -92,14 +92,14 @@ def error_sensitivities(
     corrected: bool = False,
 ) -> tuple[Floats, Floats]:
     """The error (N, 3) [m] of ``rows`` with the controller sent to ``command``, and its sensitivities S (N, 3, P);
-    ``corrected`` as of ``CompensationProblem.given``."""
+    ``corrected`` as of ``CompensationProblem.conditions_at``."""
     model, tool, wrench = task.model, task.tool[rows], task.wrench[rows]
     wanted, placed = task.wanted[rows], task.robot_from_path(rows)
     axes = task.base[rows].rotation
     if placed is not None:
         command, wrench = placed @ command, rotate_wrench(placed, wrench)
         axes = placed.rotation @ axes
-    given = task.given(rows, corrected=corrected)
+    given = task.conditions_at(rows, corrected=corrected)
     here = predict(model, command, LoadCase(tool, wrench, given, task.track.status[rows], task.track.q[rows]))
     moves = sensitivities(model, entries, here.q, wrench, tool, given, here.displacement, axes)
     moves -= goal_sensitivities(task, entries, rows, wanted)

@@ -131,7 +131,7 @@ POLE = np.radians(1.0)
 """[rad] Lean at which a pair of axes is near its pole: farther away even segments become longer with the lean."""
 
 
-def spread(path: Toolpath, rows: Ints, low: Floats, high: Floats, part: Floats) -> Floats:
+def shares_between(path: Toolpath, rows: Ints, low: Floats, high: Floats, part: Floats) -> Floats:
     """(K,) shares of the paths of ``rows`` (K,): the parts ``part`` (K,), 0 to 1, of what lies between the shares
     ``low`` and ``high`` (K,).
 

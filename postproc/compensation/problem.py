@@ -96,10 +96,12 @@ class CompensationProblem:
         q = self.track.q[rows]
         return q if self.external is None else self.external.joint_values(q, rows, share)
 
-    def _load_case(self, rows: Ints, wrench: Floats, given: Conditions, share: Floats | None) -> LoadCase:
+    def _load_case(
+        self, rows: Ints, wrench: Floats, conditions: Conditions, share: Floats | None
+    ) -> LoadCase:
         """Motions ``rows`` (K,) at the shares (K,) of their paths; ``wrench`` (K, 6) in the robot's own axes."""
         return LoadCase(
-            self.tool.shared(rows), wrench, given, self.track.status[rows], self.q_reference(rows, share)
+            self.tool.shared(rows), wrench, conditions, self.track.status[rows], self.q_reference(rows, share)
         )
 
     @cached_property
@@ -107,7 +109,7 @@ class CompensationProblem:
         """On which side of its gap each axis lies as the program runs corrected."""
         return None if self.lost_motion is None else self.lost_motion.run(self.gain)
 
-    def given(self, rows: Ints, share: Floats | None = None, corrected: bool = False) -> Conditions:
+    def conditions_at(self, rows: Ints, share: Floats | None = None, corrected: bool = False) -> Conditions:
         """What else is known of motions ``rows`` (K,) at ``share`` (K,) of their paths, their ends without: as the
         program runs uncorrected, or ``corrected``."""
         if self.lost_motion is None or (share is None and not corrected):
@@ -146,7 +148,7 @@ class CompensationProblem:
         ``given``; ``came`` (K, n): the sides of another program."""
         if self.lost_motion is not None:
             start = None  # it may lie on the other side of a gap
-        given = self.given(rows, share, corrected)
+        given = self.conditions_at(rows, share, corrected)
         if came is not None:
             given = replace(given, direction=came)
         return self._predicted(rows, command, wrench, given, start, q, share)
@@ -156,7 +158,7 @@ class CompensationProblem:
         rows: Ints,
         command: Poses,
         wrench: Floats,
-        given: Conditions,
+        conditions: Conditions,
         start: Floats | None = None,
         q: Floats | None = None,
         share: Floats | None = None,
@@ -165,7 +167,7 @@ class CompensationProblem:
         prediction = predict(
             self.model,
             command if placed is None else placed @ command,
-            self._load_case(rows, rotate_wrench(placed, wrench), given, share),
+            self._load_case(rows, rotate_wrench(placed, wrench), conditions, share),
             start,
             q,
         )

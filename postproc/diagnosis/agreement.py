@@ -63,7 +63,7 @@ def without_effects(campaign: Campaign, fitted: Fit, gone: Sequence[Candidate]) 
         keys |= keys_of(fitted.model, candidate).keys()
     rest = [i for i, u in enumerate(fitted.unknowns) if u.key not in keys]
     point = descended(campaign, point_without(campaign, fitted, gone), (), fitted.plain_weights)
-    own, nuisance = fitted.point.taken
+    own, nuisance = fitted.point.required_columns
     return replace(
         fitted,
         asked=tuple(u for u in fitted.asked if u.key not in keys),
@@ -106,14 +106,14 @@ def _states(campaign: Campaign, model: StiffnessModel) -> tuple[Floats, Floats, 
 
 
 def _places(
-    campaign: Campaign, model: StiffnessModel, q: Floats, wrench: Floats, given: Conditions
+    campaign: Campaign, model: StiffnessModel, q: Floats, wrench: Floats, conditions: Conditions
 ) -> Floats:
     """(N, 3) [m] of the TCP, or its displacement by the wrench where such were measured; NaN without equilibrium."""
-    rest = model.equilibrium(q, wrench, campaign.tool, given)
+    rest = model.equilibrium(q, wrench, campaign.tool, conditions)
     place = np.where(rest.converged[:, None], rest.pose.position, np.nan)
     if campaign.still is None:
         return place
-    still = model.equilibrium(q, np.zeros_like(wrench), campaign.tool, given)
+    still = model.equilibrium(q, np.zeros_like(wrench), campaign.tool, conditions)
     return np.asarray(place - np.where(still.converged[:, None], still.pose.position, np.nan))
 
 

@@ -106,11 +106,11 @@ def find_alternatives(
     return tuple(sorted(alternatives, key=lambda alternative: alternative.margin))
 
 
-def _signal(given: Problem, rest: Explained, last: Explained, group: int) -> Floats:
+def _signal(problem: Problem, rest: Explained, last: Explained, group: int) -> Floats:
     """(n,) what a chosen group does, outside of what the others explain."""
-    on = np.isin(last.columns, given.places[group])
-    does = given.matrix[:, last.columns[on]] @ last.coefficients[on]
-    return beside(given, rest, does[:, None])[:, 0]
+    on = np.isin(last.columns, problem.places[group])
+    does = problem.matrix[:, last.columns[on]] @ last.coefficients[on]
+    return beside(problem, rest, does[:, None])[:, 0]
 
 
 def _predicts(columns: Floats, signal: Floats, variance: float) -> bool:

@@ -79,11 +79,13 @@ def _may_explain(campaign: Campaign, done: Diagnosis) -> bool:
         return True  # it does something else on other sides
     fitted = done.search.final
     sample = sample_of(campaign)
-    found = candidates(sample, fitted.model, fitted.point.given, by_direction=True)
+    found = candidates(sample, fitted.model, fitted.point.nuisances, by_direction=True)
     if any(c.nonlinear and c.columns.any() for c in found):
         return True  # what they do does not show in their columns
     weights = fitted.plain_weights
-    basis = basis_of(np.nan_to_num(np.concatenate([weights(part) for part in fitted.point.taken], axis=1)))
+    basis = basis_of(
+        np.nan_to_num(np.concatenate([weights(part) for part in fitted.point.required_columns], axis=1))
+    )
     columns = [weights(np.nan_to_num(c.columns)) for c in found if c.columns.any()]
     if not columns:
         return False

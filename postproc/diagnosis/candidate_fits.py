@@ -38,7 +38,7 @@ def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate]) -> 
     additional = [
         replace(u, value=start.get(u.key, u.value)) if u.prior is None else u for u in with_gauge(unknowns)
     ]
-    fitted = fit(campaign, model.with_values(start), [*own, *additional], given=base.point.given)
+    fitted = fit(campaign, model.with_values(start), [*own, *additional], nuisances=base.point.nuisances)
     if not any(candidate.effect.by_direction for candidate in chosen):
         return fitted
     return put_back(campaign, fitted, {u.key for u in own})
@@ -59,7 +59,7 @@ def put_back(campaign: Campaign, fitted: Fit, own: Set[tuple[int, str]]) -> Fit:
         if unknown.key not in own or not off > estimate.ci95 > 0:
             continue
         model = point.model.with_values({unknown.key: unknown.value})
-        there = at(campaign, model, point.given, point.predicted.displacement)
+        there = at(campaign, model, point.nuisances, point.predicted.displacement)
         if squares(there) < squares(point) + INDIFFERENT:
             point = there
             covariance[k] *= off / estimate.ci95
@@ -78,12 +78,15 @@ def _begun(
         return {}
     nulls = {(term, u.parameter.name): u.parameter.null for u in candidate.unknowns}
     start = dict(zip(nulls, candidate.start, strict=True))
-    there = at(campaign, model.with_values(start), base.point.given)
+    there = at(campaign, model.with_values(start), base.point.nuisances)
     if not there.predicted.converged.all():
         return {}
     for key, null in nulls.items():
         without = at(
-            campaign, model.with_values({**start, key: null}), base.point.given, there.predicted.displacement
+            campaign,
+            model.with_values({**start, key: null}),
+            base.point.nuisances,
+            there.predicted.displacement,
         )
         moved = np.linalg.norm(base.weights(np.nan_to_num(without.residual - there.residual)))
         if without.predicted.converged.all() and moved < 1.0:
@@ -153,4 +156,4 @@ def point_without(campaign: Campaign, fitted: Fit, chosen: Sequence[Candidate]) 
         nulls |= keys_of(fitted.model, candidate)
     if not nulls:
         return fitted.point
-    return at(campaign, fitted.model.with_values(nulls), fitted.point.given)
+    return at(campaign, fitted.model.with_values(nulls), fitted.point.nuisances)

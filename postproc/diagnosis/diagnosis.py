@@ -76,7 +76,7 @@ def diagnose(
     stated = fit(campaign, model, (), rows)
     stage("fitting the model's own parameters")
     sample = sample_of(campaign)
-    base = fit(sample, model, own, given=stated.point.given)
+    base = fit(sample, model, own, nuisances=stated.point.nuisances)
     stage("looking for what is missing")
     result = search(sample, base)
     verdict = judge(result)
@@ -151,7 +151,12 @@ def _squares(fitted: Fit, weights: Weighting) -> float:
 def _fitted_to(campaign: Campaign, fitted: Fit) -> Fit:
     """A fit of some readings, fitted to all of them; what those do not give keeps its value."""
     found = fit(
-        campaign, fitted.model, fitted.unknowns, given=fitted.point.given, near=True, factor=fitted.factor
+        campaign,
+        fitted.model,
+        fitted.unknowns,
+        nuisances=fitted.point.nuisances,
+        near=True,
+        factor=fitted.factor,
     )
     return replace(found, asked=fitted.asked, dropped=(*fitted.dropped, *found.dropped))
 

@@ -61,12 +61,12 @@ def moved(final: Fit, named: Named) -> Floats:
     """(R, 3) [m] what the effect, as ``final`` has it, moves of each reading beyond what tracker and targets that were
     elsewhere would; axes of the robot base."""
     nulls = {e.unknown.key: e.unknown.parameter.null for e in named.estimates}
-    without = at(final.campaign, final.model.with_values(nulls), final.point.given)
+    without = at(final.campaign, final.model.with_values(nulls), final.point.nuisances)
     by = without.residual - final.point.residual
     on = final.weights.weight > 0
-    nuisance = np.nan_to_num(final.point.taken[1])
+    nuisance = np.nan_to_num(final.point.required_columns[1])
     step = np.linalg.lstsq(nuisance[on], by[on], rcond=None)[0]
-    return final.campaign.in_base(by - nuisance @ step, final.point.given)[:, :3]
+    return final.campaign.in_base(by - nuisance @ step, final.point.nuisances)[:, :3]
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def _tried(search: Search, one: Smallest) -> Smallest:
         if size > room:
             return none
         model = candidate.model.with_values({unknown.key: unknown.parameter.null + away * size})
-        there = at(base.campaign, model, base.point.given, displacement_in(model, base.point))
+        there = at(base.campaign, model, base.point.nuisances, displacement_in(model, base.point))
         if not there.predicted.converged.all():
             return none
         does = np.nan_to_num(base.point.residual - there.residual)

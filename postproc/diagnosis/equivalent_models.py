@@ -109,8 +109,8 @@ def _posterior(full: Fit, model: StiffnessModel, others: Mapping[Unknown, bool])
     """(k, k) covariance and (k,) mean [SI] of the unknowns of ``full``, with ``others`` in ``model`` beside them."""
     campaign, point, own = full.campaign, full.point, list(full.unknowns)
     beside = list(others)
-    moves = columns(campaign, model, beside, predicted_in(model, point), point.given)
-    parts = [np.nan_to_num(full.weights(part)) for part in (*point.taken, moves)]
+    moves = columns(campaign, model, beside, predicted_in(model, point), point.nuisances)
+    parts = [np.nan_to_num(full.weights(part)) for part in (*point.required_columns, moves)]
     wide = [u.parameter.scale if u.prior is None else u.prior for u in beside]
     size = np.array(wide) / scales(beside)
     # what would have shown in its plausible size, and was not found, is not there
@@ -118,7 +118,7 @@ def _posterior(full: Fit, model: StiffnessModel, others: Mapping[Unknown, bool])
     counts = np.array(list(others.values())) | (shown < SHOWS * np.sqrt(full.factor))
     matrix = np.concatenate([parts[0], parts[2][:, counts], parts[1]], axis=1)
     weight = prior_weight(full.factor)
-    known, offset = campaign.nuisance_prior(point.given)
+    known, offset = campaign.nuisance_prior(point.nuisances)
     k, c = len(own), int(counts.sum())
     rows = np.zeros((k + c + len(known), matrix.shape[1]))
     rows[:k, :k] = prior_rows(own) * weight

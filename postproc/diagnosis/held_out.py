@@ -96,12 +96,12 @@ def _left_out(matrix: Floats, target: Floats, part: Ints) -> Floats:
     return away
 
 
-def _expected(given: Problem, last: Explained, group: int) -> Floats:
+def _expected(problem: Problem, last: Explained, group: int) -> Floats:
     """(p,) one over the deviation that is expected of each parameter of a chosen group, in its scale: ``USUAL`` times
     the largest that was found of it."""
-    on = np.isin(last.columns, given.places[group])
-    largest = np.abs(last.coefficients[on] / given.size[given.places[group]]).max(initial=0.0)
-    return np.full(len(given.places[group]), 1.0 / (USUAL * largest) if largest > 0 else 0.0)
+    on = np.isin(last.columns, problem.places[group])
+    largest = np.abs(last.coefficients[on] / problem.size[problem.places[group]]).max(initial=0.0)
+    return np.full(len(problem.places[group]), 1.0 / (USUAL * largest) if largest > 0 else 0.0)
 
 
 def _misfit(matrix: Floats, target: Floats, part: Ints, variance: float) -> float:

@@ -62,7 +62,7 @@ def evaluate_at_size(
 
     def taken(x: Floats, start: Floats) -> tuple[Point, Floats]:
         values = {u.key: v for u, v in zip(unknowns, (null + x * scale).tolist(), strict=True)}
-        there = at(campaign, model.with_values(values), point.given, start, ROUGH)
+        there = at(campaign, model.with_values(values), point.nuisances, start, ROUGH)
         does = np.nan_to_num(point.residual - there.residual)
         return there, does
 
@@ -71,7 +71,7 @@ def evaluate_at_size(
     remaining = target - outside(does[:, :, None])[:, 0]
     for _ in range(STEPS):
         there = with_columns(campaign, there, unknowns)
-        matrix = outside(np.nan_to_num(there.taken[0]))
+        matrix = outside(np.nan_to_num(there.required_columns[0]))
         step, before = _step(matrix, remaining, low - x, high - x), remaining @ remaining
         for _ in range(6):
             trial = np.clip(x + step, low, high)
@@ -91,7 +91,7 @@ def evaluate_at_size(
     if there.columns is None:
         there = with_columns(campaign, there, unknowns)
     return NonlinearColumns(
-        null + x * scale, whole(np.nan_to_num(there.taken[0]), does, x), target, remaining
+        null + x * scale, broyden_update(np.nan_to_num(there.required_columns[0]), does, x), target, remaining
     )
 
 
@@ -108,7 +108,7 @@ def _step(matrix: Floats, remaining: Floats, low: Floats, high: Floats) -> Float
     return np.asarray(step)
 
 
-def whole(columns: Floats, does: Floats, values: Floats) -> Floats:
+def broyden_update(columns: Floats, does: Floats, values: Floats) -> Floats:
     """(R, k, P): the ``columns`` (R, k, P) nearest to those given for which columns times ``values`` (P,) is ``does``
     (R, k): the rank-one update of Broyden."""
     square = float(values @ values)

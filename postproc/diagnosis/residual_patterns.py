@@ -59,7 +59,7 @@ def residual_patterns(
 
     campaign, weights = fitted.campaign, (against or fitted).weights
     residual = weights(np.nan_to_num(fitted.point.residual))
-    taken = np.nan_to_num(np.concatenate([weights(part) for part in fitted.point.taken], axis=1))
+    taken = np.nan_to_num(np.concatenate([weights(part) for part in fitted.point.required_columns], axis=1))
     explained_by_fit = basis_of(taken)
     residual = outside(explained_by_fit, residual[:, None])[:, 0]
     squares, rows = float(residual @ residual), weights.counts
@@ -127,7 +127,7 @@ def patterns(
     chain = fitted.model.chain
     coordinates = chain.placed(readings.q)
     swept = chain.evaluate(coordinates, campaign.tool)
-    points = campaign.points(predicted, fitted.point.given.places, campaign.at)
+    points = campaign.points(predicted, fitted.point.nuisances.places, campaign.at)
     torque = generalized_force(swept, swept.position, readings.wrench.T)
     loaded = bool(readings.wrench.any())
     for i, joint in enumerate(fitted.model.robot.joints):
@@ -138,7 +138,7 @@ def patterns(
                 turn = turn + ratio * _turn(swept, follower, points)
         turn = np.where(readings.based[:, None], 0.0, turn)
         if campaign.tracked:
-            frames = fitted.point.given.frames.rotation[readings.session]
+            frames = fitted.point.nuisances.frames.rotation[readings.session]
             turn = (frames @ turn[:, :, None])[:, :, 0]
         angle = ("deg", DEG) if joint.kind == "revolute" else ("mm", MM)
         yield f"{joint.name} over its angle", readings.q[:, i], turn, angle

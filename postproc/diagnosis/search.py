@@ -11,7 +11,7 @@ from postproc.base.arrays import Floats
 from postproc.diagnosis.alternatives import find_alternatives
 from postproc.diagnosis.candidate_fits import composed, in_scales, keys_of, point_without, with_effects
 from postproc.diagnosis.candidates import Candidate, candidates, is_visible
-from postproc.diagnosis.nonlinear_effects import Outside, evaluate_at_size, whole
+from postproc.diagnosis.nonlinear_effects import Outside, broyden_update, evaluate_at_size
 from postproc.diagnosis.search_result import Key, Linear, Search
 from postproc.diagnosis.selection import (
     basis_of,
@@ -80,7 +80,7 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
     # what a missing effect does to all readings of a pose looks like an error that they share
     weights = replace(base.weights, shared=0.0)
     every = drop_confounded(
-        base, weights, candidates(campaign, base.model, base.point.given, near=base.point)
+        base, weights, candidates(campaign, base.model, base.point.nuisances, near=base.point)
     )
     shown = [c for c in every if is_visible(c, weights) and c.key not in banned]
     hidden = tuple(c for c in every if not is_visible(c, weights))
@@ -112,7 +112,9 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
 def drop_confounded(base: Fit, weights: Weighting, every: Sequence[Candidate]) -> list[Candidate]:
     """The candidates without those parameters that, in their usual size, do nothing observable but what parameters of
     the robot file, or tracker and targets, do as well: a gain of the force is a softer arm."""
-    basis = basis_of(np.nan_to_num(np.concatenate([weights(part) for part in base.point.taken], axis=1)))
+    basis = basis_of(
+        np.nan_to_num(np.concatenate([weights(part) for part in base.point.required_columns], axis=1))
+    )
     remaining = []
     for c in every:
         columns = np.nan_to_num(weights(c.columns))
@@ -175,7 +177,7 @@ def _linear(
 ) -> Linear:
     """The problem that the candidates' columns make of the residual of ``fitted`` without what was chosen; priors of
     the model's own parameters count as rows."""
-    own, nuisance = base.point.taken
+    own, nuisance = base.point.required_columns
     prior, away = _priors(campaign, base, fitted)
 
     def tall(columns: Floats, below: Floats) -> Floats:
@@ -214,7 +216,7 @@ def _priors(campaign: Campaign, base: Fit, fitted: Fit) -> tuple[Floats, Floats]
     ``fitted`` is from it (k,), in standard deviations."""
     own = prior_rows(base.unknowns)
     away = np.array([u.value for u in base.unknowns]) - _values(fitted.model, base.unknowns)
-    known, offset = campaign.nuisance_prior(fitted.point.given)
+    known, offset = campaign.nuisance_prior(fitted.point.nuisances)
     stated = own.any(axis=1)
     rows = np.block(
         [
@@ -241,7 +243,7 @@ def _as_fitted(
     campaign: Campaign, fitted: Fit, chosen: Sequence[Candidate], current: Sequence[Candidate]
 ) -> tuple[Candidate, ...]:
     """The candidates, those chosen with their columns at the fit instead of at their null."""
-    own, _ = fitted.point.taken
+    own, _ = fitted.point.required_columns
     values = in_scales(fitted, fitted.unknowns)
     there: dict[Key, Candidate] = {}
     counted: set[tuple[int, str]] = set()
@@ -254,7 +256,7 @@ def _as_fitted(
         columns = np.nan_to_num(own[:, :, at])
         if candidate.nonlinear:
             does = point_without(campaign, fitted, [candidate]).residual - fitted.point.residual
-            columns = whole(columns, np.nan_to_num(does), values[at])
+            columns = broyden_update(columns, np.nan_to_num(does), values[at])
         there[candidate.key] = candidate.fitted(columns, [fitted.unknowns[i] for i in at])
     return tuple(there.get(c.key, c) for c in current)
 

@@ -132,21 +132,21 @@ class Explained:
     coefficients: Floats
 
 
-def explained(given: Problem, groups: Sequence[int]) -> Explained:
+def explained(problem: Problem, groups: Sequence[int]) -> Explained:
     """The least squares of the residual over ``groups``, each coefficient within its reach."""
     chosen = tuple(groups)
     if not chosen:
-        return Explained((), given.squares, 0, np.zeros(0, np.int64), np.zeros(0))
-    at = np.concatenate([given.places[g] for g in chosen])
-    gram, aim = given.gram[np.ix_(at, at)], given.aim[at]
+        return Explained((), problem.squares, 0, np.zeros(0, np.int64), np.zeros(0))
+    at = np.concatenate([problem.places[g] for g in chosen])
+    gram, aim = problem.gram[np.ix_(at, at)], problem.aim[at]
     value, vector = np.linalg.eigh(gram)
     on = value > APART**2
     inverse = vector[:, on] / value[on]
     coefficients = inverse @ (vector[:, on].T @ aim)
-    low, high = given.reach[at].T
+    low, high = problem.reach[at].T
     if np.any(coefficients < low - 1e-9) or np.any(coefficients > high + 1e-9):
         coefficients = _bounded(value, vector, aim, low, high)
-    squares = given.squares - float(coefficients @ (2 * aim - gram @ coefficients))
+    squares = problem.squares - float(coefficients @ (2 * aim - gram @ coefficients))
     return Explained(chosen, max(squares, 0.0), int(on.sum()), at, coefficients)
 
 
@@ -157,9 +157,9 @@ def _bounded(value: Floats, vector: Floats, aim: Floats, low: Floats, high: Floa
     return bounded_least_squares(matrix, right, np.minimum(low, 0.0), np.maximum(high, 0.0))
 
 
-def beside(given: Problem, rest: Explained, columns: Floats) -> Floats:
+def beside(problem: Problem, rest: Explained, columns: Floats) -> Floats:
     """(n, p) ``columns`` (n, p) without what the groups of ``rest`` do as well."""
-    return outside(basis_of(given.matrix[:, rest.columns]), columns) if len(rest.columns) else columns
+    return outside(basis_of(problem.matrix[:, rest.columns]), columns) if len(rest.columns) else columns
 
 
 def complexity_penalty(columns: Floats, residual: Floats, variance: float) -> float:
@@ -189,14 +189,14 @@ def complexity_penalty(columns: Floats, residual: Floats, variance: float) -> fl
     return float((gradient**2 / information).sum() - average)
 
 
-def residual_of(given: Problem, last: Explained) -> Floats:
+def residual_of(problem: Problem, last: Explained) -> Floats:
     """(n,) what remains of the residual."""
-    return np.asarray(given.residual - given.matrix[:, last.columns] @ last.coefficients)
+    return np.asarray(problem.residual - problem.matrix[:, last.columns] @ last.coefficients)
 
 
-def clipped_squares(given: Problem, last: Explained) -> float:
+def clipped_squares(problem: Problem, last: Explained) -> float:
     """The remaining squares, outliers clipped, as large as those of normal ones would be."""
-    residual = residual_of(given, last)
+    residual = residual_of(problem, last)
     rows = np.abs(residual[residual != 0])
     # the median gives the level from which on readings are outliers
     level = float(np.median(rows)) / 0.6745 if len(rows) else 0.0
@@ -204,13 +204,13 @@ def clipped_squares(given: Problem, last: Explained) -> float:
     return min(last.squares, float(clipped @ clipped) / CLIPPED)
 
 
-def scatter(given: Problem, last: Explained) -> float:
+def scatter(problem: Problem, last: Explained) -> float:
     """Variance of the residual; at least 1 where that is what was stated."""
-    variance = clipped_squares(given, last) / max(1, given.freedom - last.rank)
-    return max(1.0, variance) if given.known else max(variance, 1e-300)
+    variance = clipped_squares(problem, last) / max(1, problem.freedom - last.rank)
+    return max(1.0, variance) if problem.known else max(variance, 1e-300)
 
 
-def probability(given: Problem, squares: float, rank: int, variance: float, freedom: int) -> float:
+def probability(problem: Problem, squares: float, rank: int, variance: float, freedom: int) -> float:
     """That ``rank`` columns explain ``squares`` by chance.
 
     Where readings come in clusters, what those share adds to the scatter, and is known from so many of them only: the F
@@ -221,73 +221,75 @@ def probability(given: Problem, squares: float, rank: int, variance: float, free
 
     if rank == 0 or squares <= 0:
         return 1.0
-    if given.clusters:
-        freedom = min(freedom, given.clusters - 1)
-    elif given.known and variance == 1.0:
+    if problem.clusters:
+        freedom = min(freedom, problem.clusters - 1)
+    elif problem.known and variance == 1.0:
         return float(chdtrc(rank, squares))
     return float(fdtrc(rank, max(1, freedom), squares / rank / variance))
 
 
-def gain_by_chance(given: Problem, rank: int, freedom: int, among: int) -> float:
+def gain_by_chance(problem: Problem, rank: int, freedom: int, among: int) -> float:
     """The gain, in variances of a reading, that ``rank`` columns have with probability ``CHANCE`` by chance in any of
     ``among`` groups."""
     from scipy.special import chdtri, fdtri
 
-    if not given.clusters:
+    if not problem.clusters:
         return float(chdtri(rank, CHANCE / among))
-    return float(rank * fdtri(rank, max(1, min(freedom, given.clusters - 1)), 1.0 - CHANCE / among))
+    return float(rank * fdtri(rank, max(1, min(freedom, problem.clusters - 1)), 1.0 - CHANCE / among))
 
 
 def selected(
-    given: Problem, candidates: Sequence[int], start: Sequence[int] = (), limit: int = 12
+    problem: Problem, candidates: Sequence[int], start: Sequence[int] = (), limit: int = 12
 ) -> Explained:
     """Groups taken in one by one from ``start`` on, the one with the best evidence first, exchanged and left out again
     as long as that is better.  A group stays if by chance, among all ``candidates``, its gain has a probability below
     ``CHANCE``."""
-    now = _pruned(given, explained(given, start), len(candidates))
-    penalty = np.log(given.freedom)
+    now = _pruned(problem, explained(problem, start), len(candidates))
+    penalty = np.log(problem.freedom)
     for _ in range(limit):
-        tried = [(explained(given, (*now.groups, g)), g) for g in candidates if g not in now.groups]
+        tried = [(explained(problem, (*now.groups, g)), g) for g in candidates if g not in now.groups]
         if not tried:
             break
-        best = min(tried, key=lambda pair: pair[0].squares / _least(given, tried) + penalty * pair[0].rank)[0]
-        if not counts(given, now, best, len(candidates)):
+        best = min(tried, key=lambda pair: pair[0].squares / _least(problem, tried) + penalty * pair[0].rank)[
+            0
+        ]
+        if not counts(problem, now, best, len(candidates)):
             break
-        now = _exchanged(given, best, candidates, penalty)
-        now = _pruned(given, now, len(candidates))
+        now = _exchanged(problem, best, candidates, penalty)
+        now = _pruned(problem, now, len(candidates))
     return now
 
 
-def _least(given: Problem, tried: Sequence[tuple[Explained, int]]) -> float:
+def _least(problem: Problem, tried: Sequence[tuple[Explained, int]]) -> float:
     """The variance in which gains of this round count: that of the best."""
-    return scatter(given, min((e for e, _ in tried), key=lambda e: e.squares))
+    return scatter(problem, min((e for e, _ in tried), key=lambda e: e.squares))
 
 
-def counts(given: Problem, without: Explained, with_: Explained, among: int) -> bool:
+def counts(problem: Problem, without: Explained, with_: Explained, among: int) -> bool:
     """Whether what ``with_`` has more than ``without`` is no chance, for ``among`` groups tried."""
-    freedom = given.freedom - with_.rank
+    freedom = problem.freedom - with_.rank
     if freedom < 3:
         return False
-    variance, gain = scatter(given, with_), without.squares - with_.squares
-    if gain < (WORTH if variance > EXCEEDED or not given.known else SLIGHT) * without.squares:
+    variance, gain = scatter(problem, with_), without.squares - with_.squares
+    if gain < (WORTH if variance > EXCEEDED or not problem.known else SLIGHT) * without.squares:
         return False
     # what a few readings far out ask for is no effect
     limit = FAR * np.sqrt(variance)
-    far = [np.clip(residual_of(given, one), -limit, limit) for one in (without, with_)]
+    far = [np.clip(residual_of(problem, one), -limit, limit) for one in (without, with_)]
     gain = min(gain, float(far[0] @ far[0] - far[1] @ far[1]))
-    return probability(given, gain, with_.rank - without.rank, variance, freedom) * among < CHANCE
+    return probability(problem, gain, with_.rank - without.rank, variance, freedom) * among < CHANCE
 
 
-def _exchanged(given: Problem, now: Explained, candidates: Sequence[int], penalty: float) -> Explained:
+def _exchanged(problem: Problem, now: Explained, candidates: Sequence[int], penalty: float) -> Explained:
     """With one group exchanged for another where that explains more."""
     best = now
-    variance = scatter(given, now)
+    variance = scatter(problem, now)
     for gone in now.groups[:-1]:
         rest = tuple(g for g in now.groups if g != gone)
         for g in candidates:
             if g in now.groups:
                 continue
-            other = explained(given, (*rest, g))
+            other = explained(problem, (*rest, g))
             if (
                 other.squares / variance + penalty * other.rank
                 < best.squares / variance + penalty * best.rank - 1.0
@@ -296,11 +298,11 @@ def _exchanged(given: Problem, now: Explained, candidates: Sequence[int], penalt
     return best
 
 
-def _pruned(given: Problem, now: Explained, among: int) -> Explained:
+def _pruned(problem: Problem, now: Explained, among: int) -> Explained:
     """Without the groups that the others make unnecessary."""
     while now.groups:
-        without = [explained(given, tuple(g for g in now.groups if g != gone)) for gone in now.groups]
-        needless = [w for w in without if not counts(given, w, now, among)]
+        without = [explained(problem, tuple(g for g in now.groups if g != gone)) for gone in now.groups]
+        needless = [w for w in without if not counts(problem, w, now, among)]
         if not needless:
             return now
         now = min(needless, key=lambda w: w.squares)

@@ -38,15 +38,15 @@ def restore_unmoved_parameters(fitted: Fit) -> Fit:
         return fitted
     own = [fitted.unknowns[k] for k in places]
     matrix, target = _problem(fitted, places, own)
-    price = max(LEAST, 2.0 * np.log(len(own))) * max(fitted.factor, 1e-300)
-    chosen = _chosen(matrix, target, price)
+    penalty = max(LEAST, 2.0 * np.log(len(own))) * max(fitted.factor, 1e-300)
+    chosen = _chosen(matrix, target, penalty)
     new = {(u.term, u.parameter.joint) for u in own if u.stated is None}
     if len(chosen) == len(own) or not new <= {(own[k].term, own[k].parameter.joint) for k in chosen}:
         return fitted
     gone = {own[k].key: _before(own[k]) for k in range(len(own)) if k not in chosen}
     rest = [u for u in fitted.asked if u.key not in gone]
     model = fitted.model.with_values(gone)
-    found = fit(fitted.campaign, model, rest, given=fitted.point.given, factor=fitted.factor)
+    found = fit(fitted.campaign, model, rest, nuisances=fitted.point.nuisances, factor=fitted.factor)
     worse = (_squares(found, fitted) - _squares(fitted, fitted)) / max(fitted.factor, 1e-300)
     if worse > chdtri(len(gone), TOGETHER):
         return fitted
@@ -82,7 +82,7 @@ def _squares(one: Fit, like: Fit) -> float:
 def _problem(fitted: Fit, places: Sequence[int], own: Sequence[Unknown]) -> tuple[Floats, Floats]:
     """Columns (n, k), whitened, of the parameters and what they explain together with the residual (n,), all outside of
     what everything else in the fit explains."""
-    columns, nuisance = (np.nan_to_num(fitted.weights(part)) for part in fitted.point.taken)
+    columns, nuisance = (np.nan_to_num(fitted.weights(part)) for part in fitted.point.required_columns)
     others = [k for k in range(columns.shape[1]) if k not in places]
     basis = basis_of(np.concatenate([columns[:, others], nuisance], axis=1))
     moved = (fitted.point.values(own) - np.array([_before(u) for u in own])) / scales(own)
@@ -91,8 +91,8 @@ def _problem(fitted: Fit, places: Sequence[int], own: Sequence[Unknown]) -> tupl
     return outside(basis, matrix), outside(basis, target[:, None])[:, 0]
 
 
-def _chosen(matrix: Floats, target: Floats, price: float) -> list[int]:
-    """Columns of ``matrix`` (n, k) that explain more of ``target`` (n,) than their ``price``."""
+def _chosen(matrix: Floats, target: Floats, penalty: float) -> list[int]:
+    """Columns of ``matrix`` (n, k) that explain more of ``target`` (n,) than their ``penalty``."""
     chosen: list[int] = []
     while len(chosen) < matrix.shape[1]:
         basis = basis_of(matrix[:, chosen]) if chosen else np.zeros((len(target), 0))
@@ -102,13 +102,13 @@ def _chosen(matrix: Floats, target: Floats, price: float) -> list[int]:
         along = (beside.T @ outside(basis, target[:, None])[:, 0]) / np.where(seen, length, 1.0)
         gain = np.where(seen, along**2, 0.0)
         best = int(np.argmax(gain))
-        if gain[best] < price:
+        if gain[best] < penalty:
             break
         chosen.append(best)
     while chosen:
         rest = [_remaining(matrix[:, [c for c in chosen if c != gone]], target) for gone in chosen]
         least = int(np.argmin(rest))
-        if rest[least] - _remaining(matrix[:, chosen], target) > price:
+        if rest[least] - _remaining(matrix[:, chosen], target) > penalty:
             break
         del chosen[least]
     return chosen

@@ -46,8 +46,8 @@ def take_in_unstated_geometry(fitted: Fit) -> Fit:
     ]
     if not new:
         return fitted
-    campaign, given = fitted.campaign, fitted.point.given
-    found = fit(campaign, model, [*fitted.unknowns, *with_gauge(new)], given=given, factor=fitted.factor)
+    campaign, given = fitted.campaign, fitted.point.nuisances
+    found = fit(campaign, model, [*fitted.unknowns, *with_gauge(new)], nuisances=given, factor=fitted.factor)
     worse = (_squares(found, fitted) - _squares(fitted, fitted)) / max(fitted.factor, 1e-300)
     before, after = (float(_deviations(one) @ _deviations(one)) for one in (fitted, found))
     if worse > SAME_FIT or after > CHEAPER * before:

@@ -95,8 +95,8 @@ class Designs:
 
     model: with effects that were dormant at the sizes of their parameters; candidates: that there were to choose from;
     at_random: medians over random designs of the intervals (P,) and of their worst ratio; before: intervals (P,) by the
-    readings that exist, None without; unseen: what no pose can show; left_out, weak: what the design of the wanted
-    number of poses does not show, or less precisely than wanted, weakest first.
+    readings that exist, None without; unobservable: what no pose can show; left_out, weak: what the design of the
+    wanted number of poses does not show, or less precisely than wanted, weakest first.
     """
 
     model: StiffnessModel
@@ -133,9 +133,9 @@ def designs(
     stage("computing what poses show")
     start = rested(model, setups, evaluated)
     whole = judged(model, unknowns, start.shown, task.before)[1]
-    unseen = tuple(_unobservable(task, model, start, dropped) for dropped in whole.dropped)
+    unobservable = tuple(_unobservable(task, model, start, dropped) for dropped in whole.dropped)
     if not whole.observable:
-        lost = "; ".join(f"{one.name}: {one.why}" for one in unseen)
+        lost = "; ".join(f"{one.name}: {one.why}" for one in unobservable)
         message = f"no parameter is observable at any pose: {lost}"
         raise Refusal(Finding("PLN002", message, str(model.robot.path)))
     observable = list(whole.observable)
@@ -159,7 +159,7 @@ def designs(
     stage("comparing with random poses")
     some = choices_of(task, observable, start)
     best = {size: _design(hopeful, model, pool[rows]) for size, rows in chosen.items()}
-    never = {lost.name for lost in unseen}
+    never = {lost.name for lost in unobservable}
     missed = [dropped for dropped in best[poses].dropped if dropped.name not in never]
     before = None if task.before is None else judged(model, unknowns, start.shown[:0], task.before)[0]
     return Designs(
@@ -168,7 +168,7 @@ def designs(
         chosen=best,
         at_random={size: _at_random(hopeful, model, start, some, size, rng) for size in chosen},
         before=before,
-        unobservable=unseen,
+        unobservable=unobservable,
         left_out=tuple(_unobservable(task, model, start, dropped) for dropped in missed),
         weak=_weak(task, model, start, best[poses]),
     )

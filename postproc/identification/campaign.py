@@ -109,7 +109,7 @@ class Campaign:
     def __len__(self) -> int:
         return len(self.readings)
 
-    def knowing(self, other: Campaign, given: Nuisances) -> Campaign:
+    def knowing(self, other: Campaign, nuisances: Nuisances) -> Campaign:
         """The campaign with the targets that ``other`` found, by their names, as stated ones."""
         new = copy(self)
         new.place_known, new.turn_known = self.place_known.copy(), self.turn_known.copy()
@@ -117,9 +117,9 @@ class Campaign:
         for k, name in enumerate(self.targets):
             if name in other.targets:
                 at = other.targets.index(name)
-                new.stated_places[k], new.stated_turns[k] = given.places[at], given.turns[at]
+                new.stated_places[k], new.stated_turns[k] = nuisances.places[at], nuisances.turns[at]
                 new.place_known[k] = new.turn_known[k] = True
-        new.known_scale = given.scale
+        new.known_scale = nuisances.scale
         new.nuisance_names = tuple(new._nuisance_names())
         return new
 
@@ -197,30 +197,30 @@ class Campaign:
         place = places[self.readings.target]
         return np.asarray(origin + (self.turned(predicted, at) @ place[:, :, None])[:, :, 0])
 
-    def expected(self, predicted: PredictedReadings, given: Nuisances) -> tuple[Floats, Floats | None]:
+    def expected(self, predicted: PredictedReadings, nuisances: Nuisances) -> tuple[Floats, Floats | None]:
         """(R, 3) [m], and rotations (R, 3, 3) where they are measured, in the axes of the readings; NaN where the model
         has no rest."""
-        points = self.points(predicted, given.places, self.at)
+        points = self.points(predicted, nuisances.places, self.at)
         lost = ~predicted.converged[self.at]
         rotation = self.turned(predicted, self.at)
         if self.still is not None:
-            points = points - self.points(predicted, given.places, self.still)
+            points = points - self.points(predicted, nuisances.places, self.still)
             lost = lost | ~predicted.converged[self.still]
             rotation = rotation @ np.swapaxes(self.turned(predicted, self.still), 1, 2)
         else:
-            rotation = rotation @ given.turns[self.readings.target]
+            rotation = rotation @ nuisances.turns[self.readings.target]
         points = np.where(lost[:, None], np.nan, points)
         if self.tracked:
-            frame = given.frames[self.readings.session]
-            points = points * (1.0 + given.scale)
+            frame = nuisances.frames[self.readings.session]
+            points = points * (1.0 + nuisances.scale)
             points = (frame.rotation @ points[:, :, None])[:, :, 0] + frame.position
             rotation = frame.rotation @ rotation
         return points, rotation if self.posed else None
 
-    def residual(self, predicted: PredictedReadings, given: Nuisances) -> Floats:
+    def residual(self, predicted: PredictedReadings, nuisances: Nuisances) -> Floats:
         """(R, 3) [m], or (R, 6) [m, rad] where rotations are measured: measured minus expected, in the axes of the
         readings; NaN where nothing was measured or the model has no rest."""
-        position, rotation = self.expected(predicted, given)
+        position, rotation = self.expected(predicted, nuisances)
         difference = self.readings.value - position
         if rotation is None or self.readings.rotation is None:
             return difference
@@ -229,12 +229,12 @@ class Campaign:
         away[known] = vector_from_rotation(self.readings.rotation[known] @ np.swapaxes(rotation[known], 1, 2))
         return np.concatenate([difference, away], axis=1)
 
-    def in_base(self, residual: Floats, given: Nuisances) -> Floats:
+    def in_base(self, residual: Floats, nuisances: Nuisances) -> Floats:
         """(R, 3 or 6) [m, rad] of a ``residual`` (R, 3 or 6) in axes of the robot base.  A coordinate that was not
         measured counts as zero; a place or turn of which nothing is known stays NaN."""
         if not self.tracked:
             return residual
-        back = np.swapaxes(given.frames.rotation, 1, 2)[self.readings.session]
+        back = np.swapaxes(nuisances.frames.rotation, 1, 2)[self.readings.session]
         halves = []
         for half in (residual[:, k : k + 3] for k in range(0, residual.shape[1], 3)):
             turned = (back @ np.nan_to_num(half)[:, :, None])[:, :, 0]
@@ -255,11 +255,11 @@ class Campaign:
         """Whether the scale of the tracker is an unknown, the last of the nuisances."""
         return self.tracked and self.known_scale is None
 
-    def nuisance_prior(self, given: Nuisances) -> tuple[Floats, Floats]:
+    def nuisance_prior(self, nuisances: Nuisances) -> tuple[Floats, Floats]:
         """(k, U) rows and (k,) values, in standard deviations, of what is known of the nuisances besides readings."""
         rows = np.zeros((int(self.scaled), len(self.nuisance_names)))
         rows[:, -1:] = 1.0 / SCALE
-        return rows, np.full(len(rows), (self.expected_scale - given.scale) / SCALE)
+        return rows, np.full(len(rows), (self.expected_scale - nuisances.scale) / SCALE)
 
     def _blocks(self) -> list[tuple[str, int]]:
         """What is not known, three columns each, and of which session or target it is; the scale is not among them."""
@@ -283,11 +283,11 @@ class Campaign:
             names += [f"{what}{f' {of}' if of else ''}.{axis}" for axis in axes]
         return [*names, SCALE_NAME] if self.scaled else names
 
-    def nuisance_columns(self, predicted: PredictedReadings, given: Nuisances) -> Floats:
+    def nuisance_columns(self, predicted: PredictedReadings, nuisances: Nuisances) -> Floats:
         """(R, 3 or 6, U) derivative of ``expected`` by the steps of ``moved``."""
         derivatives = np.zeros((len(self), 6, len(self.nuisance_names)))
-        points = self.points(predicted, given.places, self.at)
-        axes = given.frames.rotation[self.readings.session]
+        points = self.points(predicted, nuisances.places, self.at)
+        axes = nuisances.frames.rotation[self.readings.session]
         if self.scaled:
             derivatives[:, :3, -1] = (axes @ points[:, :, None])[:, :, 0]
         for block, (kind, k) in enumerate(self._blocks()):
@@ -309,7 +309,7 @@ class Campaign:
         return derivatives if self.posed else derivatives[:, :3]
 
     def columns(
-        self, model: StiffnessModel, predicted: PredictedReadings, given: Nuisances, moved: Floats
+        self, model: StiffnessModel, predicted: PredictedReadings, nuisances: Nuisances, moved: Floats
     ) -> Floats:
         """(R, 3 or 6, P) what moves in ``expected`` where the coordinates of the states move by ``moved`` (S, m, P);
         NaN where the model has no rest."""
@@ -325,7 +325,10 @@ class Campaign:
             moves.append(((j[:, :3] * of_base) @ moved, (j[:, 3:] * of_base) @ moved))
 
         def at(states: Ints) -> None:
-            points, sign = self.points(predicted, given.places, states), 1.0 if states is self.at else -1.0
+            points, sign = (
+                self.points(predicted, nuisances.places, states),
+                1.0 if states is self.at else -1.0,
+            )
             for target in range(len(self.targets)):
                 rows = np.flatnonzero(self.readings.target == target)
                 own = states[rows]
@@ -343,7 +346,7 @@ class Campaign:
         if self.still is not None:
             at(self.still)
         if self.tracked:
-            axes = given.frames.rotation[self.readings.session]
+            axes = nuisances.frames.rotation[self.readings.session]
             for half in range(0, derivatives.shape[1], 3):
                 derivatives[:, half : half + 3] = axes @ derivatives[:, half : half + 3]
         lost = ~predicted.converged[self.at]
@@ -352,11 +355,11 @@ class Campaign:
         derivatives[lost] = np.nan
         return derivatives
 
-    def moved(self, given: Nuisances, step: Floats) -> Nuisances:
+    def moved(self, nuisances: Nuisances, step: Floats) -> Nuisances:
         """The nuisances after a step (U,) [m, rad, 1]: frames T (exp(turn) p + shift), targets c + place and
         exp(axes) turn, the scale plus its step."""
-        rotation, position = given.frames.rotation.copy(), given.frames.position.copy()
-        places, turns = given.places.copy(), given.turns.copy()
+        rotation, position = nuisances.frames.rotation.copy(), nuisances.frames.position.copy()
+        places, turns = nuisances.places.copy(), nuisances.turns.copy()
         for block, (kind, k) in enumerate(self._blocks()):
             part = step[3 * block : 3 * block + 3]
             if kind == "shift":
@@ -367,5 +370,5 @@ class Campaign:
                 places[k] += part
             else:
                 turns[k] = rotation_from_vector(part) @ turns[k]
-        scale = given.scale + float(step[-1]) if self.scaled else given.scale
+        scale = nuisances.scale + float(step[-1]) if self.scaled else nuisances.scale
         return Nuisances(Poses(rotation, position), places, turns, scale)

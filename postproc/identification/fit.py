@@ -96,7 +96,7 @@ class Fit:
     @cached_property
     def residual(self) -> Floats:
         """(R, 3) [m] residual of each position, axes of the robot base."""
-        return self.campaign.in_base(self.point.residual, self.point.given)[:, :3]
+        return self.campaign.in_base(self.point.residual, self.point.nuisances)[:, :3]
 
     @property
     def shared_error(self) -> float:
@@ -121,7 +121,7 @@ def fit(
     unknowns: Sequence[Unknown],
     rows: Bools | None = None,
     robust: bool = False,
-    given: Nuisances | None = None,
+    nuisances: Nuisances | None = None,
     near: bool = False,
     factor: float = 1.0,
 ) -> Fit:
@@ -130,7 +130,7 @@ def fit(
     Unknowns that the readings cannot give stay as they are and are named.  Intervals come from the covariance of the
     linearized problem at the solution; where the residuals are clearly larger than the stated scatter, or none is
     stated, they are as wide as the residuals ask for.  ``robust``: readings far off are weighed down (Huber).
-    ``given``: tracker and targets to start with, where they are about known; ``near``: so is the model, the columns
+    ``nuisances``: tracker and targets to start with, where they are about known; ``near``: so is the model, the columns
     at which serve all through.  ``factor``: about the variance of the readings over the assumed one, to start with.
 
     Raises Refusal IDN002 with fewer readings than unknowns, IDN003 where the model to start with has no rest.
@@ -145,9 +145,9 @@ def fit(
                 "IDN003", f"{lost} of {len(campaign.q)} states have no equilibrium", str(model.robot.path)
             )
         )
-    if given is None:
-        given = registered(campaign, point.predicted, rows)
-    point = replace(point, given=given, residual=campaign.residual(point.predicted, given))
+    if nuisances is None:
+        nuisances = registered(campaign, point.predicted, rows)
+    point = replace(point, nuisances=nuisances, residual=campaign.residual(point.predicted, nuisances))
     weights = plain = weighting(campaign, noise, point.residual).times(rows.astype(float))
     _enough(campaign, weights, unknowns)
     point = _influential(campaign, point, unknowns)
@@ -158,7 +158,7 @@ def fit(
     while True:
         point = descended(campaign, point, free, plain, near, steps, factor, close)
         updated = _with_turns(campaign, point, noise, plain)
-        together = np.concatenate(point.taken, axis=2)
+        together = np.concatenate(point.required_columns, axis=2)
         updated = replace(updated, shared=shared_error(point.residual, updated, together, noise.known))
         if updated.shared != plain.shared or updated.weight is not plain.weight:
             plain, point = updated, descended(campaign, point, free, updated, near, steps, factor, close)
@@ -182,10 +182,10 @@ def fit(
         free = [free[i] for i in analysis.observable]
         observable, values = list(analysis.observable), {u.key: u.value for u in gone}
         if all(point.model.terms[t].values[name] == value for (t, name), value in values.items()):
-            point = replace(point, columns=point.taken[0][:, :, observable])
+            point = replace(point, columns=point.required_columns[0][:, :, observable])
         else:
             point = at(
-                campaign, point.model.with_values(values), point.given, start_point.predicted.displacement
+                campaign, point.model.with_values(values), point.nuisances, start_point.predicted.displacement
             )
     scale = scales(free)
     return Fit(
@@ -219,12 +219,12 @@ def _influential(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) 
     """The point with its columns; effects that move nothing at all where they are are put to the sizes of their
     parameters first."""
     point = with_columns(campaign, point, unknowns)
-    moves = np.abs(np.nan_to_num(point.taken[0])).max(axis=(0, 1), initial=0.0) > 0
+    moves = np.abs(np.nan_to_num(point.required_columns[0])).max(axis=(0, 1), initial=0.0) > 0
     moving = {u.term for u, moved in zip(unknowns, moves, strict=True) if moved}
     dormant = {
         u.key: u.parameter.scale for u in unknowns if u.term not in moving and u.value == u.parameter.null
     }
-    return at(campaign, point.model.with_values(dormant), point.given) if dormant else point
+    return at(campaign, point.model.with_values(dormant), point.nuisances) if dormant else point
 
 
 def _robust(
@@ -286,12 +286,12 @@ def _with_turns(campaign: Campaign, point: Point, noise: Noise, weights: Weighti
 def _insight(
     campaign: Campaign, point: Point, free: Sequence[Unknown], weights: Weighting, factor: float
 ) -> Identifiability:
-    columns, nuisance = (np.nan_to_num(weights(part)) for part in point.taken)
+    columns, nuisance = (np.nan_to_num(weights(part)) for part in point.required_columns)
     if len(columns) > MANY * (columns.shape[1] + nuisance.shape[1]):
         # as many rows as there are columns, with the same information
         reduced = np.asarray(np.linalg.qr(np.concatenate([columns, nuisance], axis=1), mode="r"))
         columns, nuisance = reduced[:, : columns.shape[1]], reduced[:, columns.shape[1] :]
-    known = campaign.nuisance_prior(point.given)[0] * prior_weight(factor)
+    known = campaign.nuisance_prior(point.nuisances)[0] * prior_weight(factor)
     columns = np.concatenate([columns, np.zeros((len(known), columns.shape[1]))])
     nuisance = np.concatenate([nuisance, known])
     prior, values = prior_rows(free) * prior_weight(factor), point.values(free)
@@ -318,7 +318,7 @@ def _variance(
 
     counts = plain.weight > 0
     share = np.where(counts, weights.weight / np.where(counts, plain.weight, 1.0), 0.0) ** 2
-    columns, nuisance = point.taken
+    columns, nuisance = point.required_columns
     q = basis(
         np.nan_to_num(weights(np.concatenate([columns[:, :, list(analysis.observable)], nuisance], axis=2)))
     )

@@ -41,7 +41,7 @@ class Point:
     the unknowns and ``nuisance`` (R, 3 or 6, U), taken here or at a point from which the path was straight."""
 
     model: StiffnessModel
-    given: Nuisances
+    nuisances: Nuisances
     predicted: PredictedReadings
     residual: Floats
     columns: Floats | None = None
@@ -49,7 +49,7 @@ class Point:
     settled: bool = False
 
     @property
-    def taken(self) -> tuple[Floats, Floats]:
+    def required_columns(self) -> tuple[Floats, Floats]:
         """columns (R, 3 or 6, P) and nuisance (R, 3 or 6, U), which must have been taken.  Raises ValueError where they
         were not."""
         if self.columns is None or self.nuisance is None:
@@ -64,14 +64,14 @@ class Point:
 def at(
     campaign: Campaign,
     model: StiffnessModel,
-    given: Nuisances,
+    nuisances: Nuisances,
     start: Floats | None = None,
     tolerance: float = REST,
 ) -> Point:
-    """The point of ``model`` with nuisances ``given``; ``start`` (S, m) [rad, m]: displacements nearby; ``tolerance``
-    as of the equilibrium."""
+    """The point of ``model`` with ``nuisances``; ``start`` (S, m) [rad, m]: displacements nearby; ``tolerance`` as of
+    the equilibrium."""
     predicted = campaign.predicted(model, start, tolerance)
-    return Point(model, given, predicted, campaign.residual(predicted, given))
+    return Point(model, nuisances, predicted, campaign.residual(predicted, nuisances))
 
 
 def displacement_in(model: StiffnessModel, near: Point) -> Floats:
@@ -96,8 +96,8 @@ def with_columns(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) 
     """The point with its columns, taken here."""
     return replace(
         point,
-        columns=columns(campaign, point.model, unknowns, point.predicted, point.given),
-        nuisance=campaign.nuisance_columns(point.predicted, point.given),
+        columns=columns(campaign, point.model, unknowns, point.predicted, point.nuisances),
+        nuisance=campaign.nuisance_columns(point.predicted, point.nuisances),
     )
 
 
@@ -133,7 +133,7 @@ def reach(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) -> tupl
         ]
     )
     if campaign.scaled:
-        low[-1], high[-1] = -LARGEST_SCALE - point.given.scale, LARGEST_SCALE - point.given.scale
+        low[-1], high[-1] = -LARGEST_SCALE - point.nuisances.scale, LARGEST_SCALE - point.nuisances.scale
     return low, high
 
 
@@ -143,7 +143,7 @@ def prior_equations(
     """Rows (k, P + U) of the priors of unknowns and nuisances, and what they ask for from ``point`` (k,), in standard
     deviations; ``factor`` as of ``descended``."""
     prior, scale = prior_rows(unknowns), scales(unknowns)
-    known, offset = campaign.nuisance_prior(point.given)
+    known, offset = campaign.nuisance_prior(point.nuisances)
     wanted = np.array([u.value for u in unknowns])
     rows = np.block(
         [[prior, np.zeros((len(prior), known.shape[1]))], [np.zeros((len(known), len(prior))), known]]
@@ -202,7 +202,9 @@ def descended(
         if not fresh or not len(whitened):
             point = point if fresh else with_columns(campaign, point, unknowns)
             fresh = True
-            whitened = np.nan_to_num(np.concatenate([weights(part) for part in point.taken], axis=1))
+            whitened = np.nan_to_num(
+                np.concatenate([weights(part) for part in point.required_columns], axis=1)
+            )
             # columns that serve all through are reduced once
             rotation, reduced = np.linalg.qr(whitened) if keep_columns else (rotation, whitened)
         rows = prior_equations(campaign, point, unknowns, factor)[0]
@@ -252,5 +254,5 @@ def _stepped(
         for u, value in zip(unknowns, values, strict=True)
     }
     model = point.model.with_values(bounded) if bounded else point.model
-    moved = at(campaign, model, campaign.moved(point.given, step[count:]), point.predicted.displacement)
+    moved = at(campaign, model, campaign.moved(point.nuisances, step[count:]), point.predicted.displacement)
     return replace(moved, columns=point.columns, nuisance=point.nuisance)

@@ -84,7 +84,7 @@ def _distances(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unk
     point = at(campaign, model, campaign.start())
     given = registered(campaign, point.predicted, rows)
     residual = campaign.residual(point.predicted, given)
-    point = replace(point, given=given, residual=residual)
+    point = replace(point, nuisances=given, residual=residual)
     some = np.where(rows[:, None], residual, np.nan)
     weights = weighting(campaign, noise_of(campaign.readings), some)
     point = descended(campaign, point, unknowns, weights, max_steps=STEPS)

@@ -48,7 +48,9 @@ def outliers(fitted: Fit, rows: Bools) -> tuple[tuple[Outlier, ...], Fit]:
     # thousands of readings a few do not pull
     robust = fitted
     if len(campaign) <= MANY:
-        robust = fit(campaign, fitted.start, fitted.asked, rows, robust=True, given=fitted.point.given)
+        robust = fit(
+            campaign, fitted.start, fitted.asked, rows, robust=True, nuisances=fitted.point.nuisances
+        )
     length, level, limit = _lengths(robust, rows)
     entries = []
     for row in np.flatnonzero(rows & (length > limit)):
@@ -83,7 +85,7 @@ def _explained(fitted: Fit, row: int, limit: float) -> str:
     """What the reading ``row`` fits better, in words."""
     campaign, readings = fitted.campaign, fitted.campaign.readings
     sigma = float(fitted.noise.sigma[row])
-    expected, _ = campaign.expected(fitted.point.predicted, fitted.point.given)
+    expected, _ = campaign.expected(fitted.point.predicted, fitted.point.nuisances)
     measured = readings.value[row]
     here = float(np.linalg.norm(measured - expected[row]))
     close = max(limit * sigma, CLEARLY * here * 0.1)

@@ -42,15 +42,15 @@ def registered(campaign: Campaign, predicted: PredictedReadings, rows: Bools) ->
 
 
 def _session(
-    campaign: Campaign, predicted: PredictedReadings, given: Nuisances, k: int, own: Ints
+    campaign: Campaign, predicted: PredictedReadings, nuisances: Nuisances, k: int, own: Ints
 ) -> Nuisances:
     some = own[np.linspace(0, len(own) - 1, min(len(own), SAMPLE)).round().astype(int)]
     few, all_of_few = campaign.seen_in(some), np.arange(len(some))
     tries = []
     for turn in _cube_turns():
-        rotation = given.frames.rotation.copy()
+        rotation = nuisances.frames.rotation.copy()
         rotation[k] = turn
-        start = replace(given, frames=Poses(rotation, given.frames.position))
+        start = replace(nuisances, frames=Poses(rotation, nuisances.frames.position))
         tries.append(_descended(few, predicted, start, all_of_few, 3))
     tries = [
         _descended(few, predicted, tried, all_of_few, 12) for tried, _ in sorted(tries, key=_size)[:FOLLOWED]
@@ -63,43 +63,43 @@ def _size(tried: tuple[Nuisances, float]) -> float:
 
 
 def _descended(
-    campaign: Campaign, predicted: PredictedReadings, given: Nuisances, rows: Ints, steps: int
+    campaign: Campaign, predicted: PredictedReadings, nuisances: Nuisances, rows: Ints, steps: int
 ) -> tuple[Nuisances, float]:
     """Gauss-Newton on positions: the nuisances, and the mean square that remains [m2]."""
-    last, before = np.inf, given
+    last, before = np.inf, nuisances
     if len(rows) < len(campaign):
         campaign = campaign.seen_in(rows)
     for _ in range(steps):
-        residual = campaign.residual(predicted, given)[:, :3]
+        residual = campaign.residual(predicted, nuisances)[:, :3]
         size = float(np.mean(residual**2))
         if not size < last * (1 - 1e-9):
             return before, last
-        last, before = size, given
-        columns = campaign.nuisance_columns(predicted, given)[:, :3]
+        last, before = size, nuisances
+        columns = campaign.nuisance_columns(predicted, nuisances)[:, :3]
         if campaign.scaled:  # of an arm that is not calibrated the scale says nothing yet
             columns[:, :, -1] = 0.0
         matrix = columns.reshape(residual.size, -1)
         step = np.linalg.lstsq(matrix.T @ matrix, matrix.T @ residual.reshape(-1), rcond=1e-13)[0]
-        given = campaign.moved(given, np.asarray(step, float))
-    return given, last
+        nuisances = campaign.moved(nuisances, np.asarray(step, float))
+    return nuisances, last
 
 
 def _turned_targets(
-    campaign: Campaign, predicted: PredictedReadings, given: Nuisances, usable: Bools
+    campaign: Campaign, predicted: PredictedReadings, nuisances: Nuisances, usable: Bools
 ) -> Nuisances:
     """The axes of targets whose turn is not stated: the mean over all readings."""
-    readings, turns = campaign.readings, given.turns.copy()
+    readings, turns = campaign.readings, nuisances.turns.copy()
     assert readings.rotation is not None
     rotation = campaign.turned(predicted, campaign.at)
     if campaign.tracked:
-        rotation = given.frames.rotation[readings.session] @ rotation
+        rotation = nuisances.frames.rotation[readings.session] @ rotation
     for k in np.flatnonzero(~campaign.turn_known):
         own = usable & (readings.target == k) & np.isfinite(readings.rotation).all(axis=(1, 2))
         if own.any():
             total = (np.swapaxes(rotation[own], 1, 2) @ readings.rotation[own]).sum(axis=0)
             u, _, v = np.linalg.svd(total)
             turns[k] = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
-    return replace(given, turns=turns)
+    return replace(nuisances, turns=turns)
 
 
 def _cube_turns() -> list[Floats]:

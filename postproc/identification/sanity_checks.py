@@ -342,7 +342,7 @@ def _first_steps(
     )
     campaign = Campaign(joined, tool)
     point = with_columns(campaign, at(campaign, model, campaign.start()), unknowns)
-    columns = np.nan_to_num(np.concatenate(point.taken, axis=2))
+    columns = np.nan_to_num(np.concatenate(point.required_columns, axis=2))
     limits, sizes = reach(campaign, point, unknowns), []
     for k, one in enumerate(tried):
         rows = slice(k * count, (k + 1) * count)
@@ -361,7 +361,7 @@ def _remaining_share(
     rows = np.ones(len(campaign), bool)
     point = at(campaign, model, campaign.start())
     given = registered(campaign, point.predicted, rows)
-    point = replace(point, given=given, residual=campaign.residual(point.predicted, given))
+    point = replace(point, nuisances=given, residual=campaign.residual(point.predicted, given))
     if campaign.readings.deflection or fitted:
         weights = weighting(campaign, noise_of(campaign.readings), point.residual)
         point = descended(campaign, point, unknowns, weights, max_steps=3)

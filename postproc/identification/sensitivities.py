@@ -20,7 +20,7 @@ def columns(
     model: StiffnessModel,
     unknowns: Sequence[Unknown],
     predicted: PredictedReadings,
-    given: Nuisances,
+    nuisances: Nuisances,
 ) -> Floats:
     """(R, 3 or 6, P) change of what is expected [m, rad] with each unknown, per ``scale`` of its parameter.
 
@@ -36,4 +36,4 @@ def columns(
         campaign.q, campaign.wrench, campaign.tool, campaign.conditions, predicted.displacement, spans
     )
     moved *= np.array([unknown.parameter.scale for unknown in unknowns])
-    return campaign.columns(model, predicted, given, moved)
+    return campaign.columns(model, predicted, nuisances, moved)

@@ -50,7 +50,7 @@ def held_out(fitted: Fit, folds: int, progress: Progress = nothing) -> Floats:
     fold = folds_of(campaign, folds)
     if len(campaign) > MANY:
         away = _linear_steps(fitted, fold, folds)
-        residuals = campaign.in_base(away, fitted.point.given)[:, :3]
+        residuals = campaign.in_base(away, fitted.point.nuisances)[:, :3]
         progress(folds, folds)
     else:
         residuals = np.full((len(campaign), 3), np.nan)
@@ -60,7 +60,7 @@ def held_out(fitted: Fit, folds: int, progress: Progress = nothing) -> Floats:
             point = descended(
                 campaign, fitted.point, fitted.unknowns, weights, True, factor=fitted.factor, close=NEAR
             )
-            residuals[rows] = campaign.in_base(point.residual, point.given)[rows, :3]
+            residuals[rows] = campaign.in_base(point.residual, point.nuisances)[rows, :3]
             progress(k + 1, folds)
     residuals[~counted(fitted)] = np.nan
     return residuals
@@ -69,7 +69,7 @@ def held_out(fitted: Fit, folds: int, progress: Progress = nothing) -> Floats:
 def _linear_steps(fitted: Fit, fold: Ints, folds: int) -> Floats:
     """(R, 3 or 6) residuals of each ``fold`` (R,) after one step to the least squares of the others."""
     campaign, point = fitted.campaign, fitted.point
-    own, nuisance = (np.nan_to_num(part) for part in point.taken)
+    own, nuisance = (np.nan_to_num(part) for part in point.required_columns)
     columns = np.concatenate([own, nuisance], axis=2)
     # the rows of a fold as so many as there are columns, with the same information
     tall = np.column_stack([fitted.weights(columns), fitted.weights(point.residual)])
@@ -111,7 +111,7 @@ def validated(before: Fit, after: Fit, campaign: Campaign) -> Validation:
     """
     refitted, residuals = False, []
     for fitted in (before, after):
-        known = campaign.knowing(fitted.campaign, fitted.point.given)
+        known = campaign.knowing(fitted.campaign, fitted.point.nuisances)
         point = at(known, fitted.model, known.start())
         given = registered(known, point.predicted, np.ones(len(known), bool))
         if known.tracked:
@@ -127,19 +127,19 @@ def validated(before: Fit, after: Fit, campaign: Campaign) -> Validation:
     return Validation(campaign, residuals[0], residuals[1], refitted)
 
 
-def _stations(fitted: Fit, campaign: Campaign, given: Nuisances) -> tuple[Nuisances, bool]:
-    """``given``, with the tracker of the fit for sessions that it knows, and whether there are others."""
+def _stations(fitted: Fit, campaign: Campaign, nuisances: Nuisances) -> tuple[Nuisances, bool]:
+    """``nuisances``, with the tracker of the fit for sessions that it knows, and whether there are others."""
     names, known = campaign.readings.sessions, fitted.campaign.readings.sessions
     pairs = [(k, known.index(name)) for k, name in enumerate(names) if name in known]
     if len(names) == len(known) == 1:
         pairs = [(0, 0)]
-    rotation, position = given.frames.rotation.copy(), given.frames.position.copy()
+    rotation, position = nuisances.frames.rotation.copy(), nuisances.frames.position.copy()
     for k, other in pairs:
         rotation[k], position[k] = (
-            fitted.point.given.frames.rotation[other],
-            fitted.point.given.frames.position[other],
+            fitted.point.nuisances.frames.rotation[other],
+            fitted.point.nuisances.frames.position[other],
         )
-    return replace(given, frames=Poses(rotation, position)), len(pairs) < len(names)
+    return replace(nuisances, frames=Poses(rotation, position)), len(pairs) < len(names)
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,7 @@ def bootstrap(fitted: Fit, draws: int, progress: Progress = nothing) -> Bootstra
             sign = rng.choice([-1.0, 1.0], len(campaign))
         moved = sign[:, None] * grown - point.residual
         drawn = campaign.shifted(moved)
-        drawn.expected_scale = float(rng.normal(point.given.scale, SCALE)) if campaign.scaled else 0.0
+        drawn.expected_scale = float(rng.normal(point.nuisances.scale, SCALE)) if campaign.scaled else 0.0
         start = replace(point, residual=point.residual + moved)
         # a prior is a reading like the others: it would have been another one
         unknowns = [
@@ -180,7 +180,7 @@ def bootstrap(fitted: Fit, draws: int, progress: Progress = nothing) -> Bootstra
 def _free_share(fitted: Fit) -> Floats:
     """(R,) root of the share of a reading's variance that its residual keeps, 1 - leverage."""
     point, weights = fitted.point, fitted.weights
-    matrix = np.concatenate([weights(part) for part in point.taken], axis=1)
+    matrix = np.concatenate([weights(part) for part in point.required_columns], axis=1)
     length = np.linalg.norm(matrix, axis=0)
     u, s, _ = np.linalg.svd(matrix[:, length > 0] / length[length > 0], full_matrices=False)
     leverage = (u[:, s > 1e-8 * s[0]] ** 2).sum(axis=1).reshape(point.residual.shape)

@@ -17,6 +17,9 @@ DIALECTS: dict[str, Dialect] = {
 }
 """Name -> dialect; the first that claims a file reads it."""
 
+COMPANION_SUFFIXES = tuple(sorted({suffix for one in DIALECTS.values() for suffix in one.companion_suffixes}))
+"""Of files that belong to the program whose name they bear."""
+
 
 _OTHER_FILES = {
     ".yaml": "a YAML file states a cell, a robot or a process: name the program, and this file with its option",

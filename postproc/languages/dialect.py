@@ -113,11 +113,18 @@ class Dialect(Protocol):
     def letters(self) -> bytes:
         """Capital letters of the words that its edits may take out of the line of a motion, or put in."""
 
+    @property
+    def companion_suffixes(self) -> tuple[str, ...]:
+        """Suffixes, in small letters, of the files of ``companions``."""
+
     def claims(self, path: Path, raw: bytes) -> bool:
         """Whether a file of this name and content is of this dialect."""
 
     def companions(self, path: Path) -> list[Path]:
-        """Files beside ``path`` that belong to the program and exist (a KRL module's .dat)."""
+        """Files beside ``path`` that belong to the program and exist; they bear its name."""
+
+    def main_file(self, companion: Path) -> Path:
+        """The program whose ``companion`` a file is."""
 
     def siblings(
         self, program: Program, settings: ReadingSettings, beside: Path | None = None

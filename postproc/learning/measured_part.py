@@ -385,12 +385,3 @@ def _parts(table: CsvTable, rows: Ints) -> Ints:
 
 def _wrong(table: CsvTable, line: int, message: str, help: str) -> Refusal:
     return Refusal(Finding("LRN001", message, str(table.path), line, help=help))
-
-
-def parts_of(measured: Sequence[MeasuredPart]) -> Ints:
-    """(K,) number of the part of all points of several files, from 0."""
-    numbers, first = [], 0
-    for one in measured:
-        numbers.append(one.part + first)
-        first += int(one.part.max()) + 1
-    return np.concatenate(numbers)

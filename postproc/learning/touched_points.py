@@ -147,7 +147,7 @@ def touched_points(
         wrench=task.force.along(row, along),
         to_contact=point - wanted.position,
         axes=task.base[row].rotation,
-        conditions=task.given(row, along, corrected=command is not None),
+        conditions=task.conditions_at(row, along, corrected=command is not None),
         at_rest=task.between_sides(row),
         spindle=turned(wanted.rotation, spindle[row]),
         process=task.process,

@@ -140,17 +140,17 @@ def solve_equilibrium(
 
 
 def _solve_in_order(
-    model: Mechanics, given: _Problems, theta: Floats, tolerance: float
+    model: Mechanics, problems: _Problems, theta: Floats, tolerance: float
 ) -> Iterator[tuple[Ints, Equilibrium]]:
     """The states in the order in which they come to rest: their numbers (K,) and where they do."""
     rows, steps = np.arange(theta.shape[1]), 0
     if not model.laws:
-        swept = model.chain.evaluate(given.rest, given.tool, given.conditions.spindle)
-        yield rows, _at_rest(swept, given.rest, np.zeros_like(given.rest), np.ones(len(rows), bool), 0)
+        swept = model.chain.evaluate(problems.rest, problems.tool, problems.conditions.spindle)
+        yield rows, _at_rest(swept, problems.rest, np.zeros_like(problems.rest), np.ones(len(rows), bool), 0)
         return
     stable, last = np.ones(len(rows), bool), np.zeros(len(rows))
     while True:
-        swept, step, holds = _step(model, given, theta)
+        swept, step, holds = _step(model, problems, theta)
         theta += step
         steps += 1
         stable &= holds
@@ -164,30 +164,30 @@ def _solve_in_order(
         # The last step is so small that nothing has to be re-evaluated.  Each state stops at its own, whatever
         # the others do: its result does not depend on them.
         good = stable & (resting | (size <= ENOUGH))
-        there = _at_rest(swept.first_order_update(step), given.rest + theta, theta, good, steps)
+        there = _at_rest(swept.first_order_update(step), problems.rest + theta, theta, good, steps)
         if ends.all():
             yield rows, there
             return
         ended, on = np.flatnonzero(ends), np.flatnonzero(~ends)
         yield rows[ended], there.part(ended)
         rows, stable, last = rows[on], stable[on], last[on]
-        theta, given = theta.take(on, axis=1), given.part(on)
+        theta, problems = theta.take(on, axis=1), problems.part(on)
 
 
-def _step(model: Mechanics, given: _Problems, theta: Floats) -> tuple[ChainKinematics, Floats, Bools]:
+def _step(model: Mechanics, problems: _Problems, theta: Floats) -> tuple[ChainKinematics, Floats, Bools]:
     """The chain at displacement ``theta`` (m, N), the step (m, N) of the iteration from there, and whether the
     diagonal holds (N,)."""
-    coordinates = given.rest + theta
-    swept = model.chain.evaluate(coordinates, given.tool, given.conditions.spindle)
+    coordinates = problems.rest + theta
+    swept = model.chain.evaluate(coordinates, problems.tool, problems.conditions.spindle)
     state = ChainState(
         model.chain,
         model.gravity,
-        given.motors,
-        given.rest,
+        problems.motors,
+        problems.rest,
         coordinates,
         swept,
-        given.wrench,
-        given.conditions,
+        problems.wrench,
+        problems.conditions,
     )
     force, slope = model.forces(state)
     target, compliance = model.displacement(state, force)

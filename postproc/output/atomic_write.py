@@ -61,7 +61,7 @@ def write_atomically(
     made: list[Path] = []
     try:
         with contextlib.ExitStack() as locks:
-            _publish(files, last, still, locks, made)
+            _put_in_place(files, last, still, locks, made)
     except BaseException:
         for folder in sorted(made, key=lambda folder: len(folder.parts), reverse=True):
             with contextlib.suppress(OSError):
@@ -106,7 +106,7 @@ def refused(path: Path, message: str, help: str) -> Refusal:
     return Refusal(Finding("FIL004", message, str(path), help=help))
 
 
-def _publish(
+def _put_in_place(
     files: Mapping[Path, Content],
     last: Path | None,
     still: Callable[[], None],

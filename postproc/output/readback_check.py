@@ -266,8 +266,8 @@ def _check_targets(
     off = np.abs(back.position[rows] - plan.position[:]).max(axis=1) / MM
     # Rotary axes state the whole orientation that is meant, though the turn about the tool is free: no axis swings.
     by_axes = path.orientation_control.path[plan.source] == OrientationPath.ROTARY_AXES
-    free_axis = np.where(by_axes[:, None], np.nan, path.orientation_control.redundant_axis[plan.source])
-    angle = _angle(plan.rotation[:], back.rotation[rows], free_axis) / DEG
+    redundant_axis = np.where(by_axes[:, None], np.nan, path.orientation_control.redundant_axis[plan.source])
+    angle = _angle(plan.rotation[:], back.rotation[rows], redundant_axis) / DEG
     most = np.where(path.kind[plan.source] == Kind.CIRC, 2 * HALF, HALF) * step_mm
     _close(off > most, off, path, plan.source, file, "mm off the plan")
     _close(angle > 3 * HALF * step_deg, angle, path, plan.source, file, "deg off the plan")
@@ -382,12 +382,12 @@ def _close(wrong: Bools, off: Floats, path: Toolpath, source: Ints, file: str, w
         raise Refusal(Finding("FIL008", f"a target is {off[row]:.6f} {words}", file, line))
 
 
-def _angle(one: Floats, other: Floats, free_axis: Floats) -> Floats:
+def _angle(one: Floats, other: Floats, redundant_axis: Floats) -> Floats:
     """(M,) [rad] between rotations, where an axis is free between its directions; 0 where one is not known."""
     known = np.isfinite(one[:, 0, 0]) & np.isfinite(other[:, 0, 0])
     if not known.all():
         one, other = (np.where(known[:, None, None], rotation, np.eye(3)) for rotation in (one, other))
     # in the turned axes: one^T other
     vectors = turn_between(np.swapaxes(other, -1, -2), np.swapaxes(one, -1, -2))
-    axis = np.nan_to_num(free_axis)
+    axis = np.nan_to_num(redundant_axis)
     return lengths(vectors - np.sum(vectors * axis, axis=1, keepdims=True) * axis)

@@ -119,7 +119,7 @@ def _slopes(
     # the same load at the point of the tool that touches the surface
     wrench = np.concatenate([wrench[:, :3], wrench[:, 3:] - np.cross(arm, wrench[:, :3])], axis=1)
     tool = task.tool[motion] @ Poses(np.broadcast_to(np.eye(3), (len(motion), 3, 3)), held)
-    given = task.given(motion, share, corrected=displaced.division is not None)
+    given = task.conditions_at(motion, share, corrected=displaced.division is not None)
     moves = sensitivities(task.model, known.entries, real.q, wrench, tool, given, real.displacement, axes)
     moves -= goal_sensitivities(task, known.entries, motion, wanted)
     return np.asarray(np.einsum("mi,mip->mp", normal, force.scaled(moves, known.entries, motion)))

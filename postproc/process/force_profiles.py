@@ -32,7 +32,7 @@ class ForceProfiles:
         """Of no motion."""
         return ForceProfiles(np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 6)))
 
-    def bent(self) -> ForceProfiles:
+    def piecewise(self) -> ForceProfiles:
         """Those that are more than one straight part."""
         _, whose, many = np.unique(self.motion, return_inverse=True, return_counts=True)
         chosen = many[whose] > 2

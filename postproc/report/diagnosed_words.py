@@ -395,10 +395,10 @@ def _more(result: Diagnosed, start: str, fit: str) -> Iterator[str]:
 def _rejected(result: Diagnosed) -> Iterator[str]:
     for candidate, why in result.verdict.rejected:
         words = _sentence(in_words(candidate))
-        yield f"{words} would explain a part, but is not named: {why}{_course(result, candidate)}."
+        yield f"{words} would explain a part, but is not named: {why}{_better_trend(result, candidate)}."
 
 
-def _course(result: Diagnosed, candidate: Candidate) -> str:
+def _better_trend(result: Diagnosed, candidate: Candidate) -> str:
     """Which course explains clearly more than an effect; "" where none does."""
     for alternative in result.diagnosis.search.rivals:
         course = alternative.candidate.effect

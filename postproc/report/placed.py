@@ -28,7 +28,7 @@ class Placed(NamedTuple):
 
 def stations(fitted: Fit) -> tuple[Placed, ...]:
     """The robot base in the tracker's frame of each session; () where places are in the robot's frame."""
-    campaign, given = fitted.campaign, fitted.point.given
+    campaign, given = fitted.campaign, fitted.point.nuisances
     if not campaign.tracked:
         return ()
     wide = _intervals(fitted)
@@ -46,7 +46,7 @@ def stations(fitted: Fit) -> tuple[Placed, ...]:
 
 def targets(fitted: Fit) -> tuple[Placed, ...]:
     """The targets whose place is not stated."""
-    campaign, given = fitted.campaign, fitted.point.given
+    campaign, given = fitted.campaign, fitted.point.nuisances
     wide, names, places = _intervals(fitted), campaign.nuisance_names, []
     for k, name in enumerate(campaign.targets):
         label = f"target{f' {name}' if name else ''}.x"
@@ -65,15 +65,15 @@ def tracker_scale(fitted: Fit) -> tuple[float, float] | None:
     unknown."""
     if not fitted.campaign.scaled:
         return None
-    return fitted.point.given.scale, float(_intervals(fitted)[-1])
+    return fitted.point.nuisances.scale, float(_intervals(fitted)[-1])
 
 
 def _intervals(fitted: Fit) -> Floats:
     """(U,) [m, rad, 1] 95 % intervals of tracker and targets, in the axes that they are moved in."""
-    own, nuisance = fitted.point.taken
+    own, nuisance = fitted.point.required_columns
     columns, others = (np.nan_to_num(fitted.weights(part)) for part in (own, nuisance))
     weight = prior_weight(fitted.factor)
-    known = fitted.campaign.nuisance_prior(fitted.point.given)[0] * weight
+    known = fitted.campaign.nuisance_prior(fitted.point.nuisances)[0] * weight
     prior = prior_rows(fitted.unknowns) * weight
     p, u = columns.shape[1], others.shape[1]
     matrix = np.block(

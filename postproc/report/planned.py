@@ -38,8 +38,8 @@ class Planned(Result):
     unknowns (P), ``wanted`` (P,) [SI] and where it is from.  setups: the poses of the plan in their order, of
     ``readings`` readings.  chosen: designs by number of poses; at_random: number of poses -> medians over random
     designs of the intervals (P,) [SI] and of their worst ratio; before (P,): as of ``Designs``; unobservable, excluded,
-    weakly_observable: as unseen, left_out, weak of ``Designs``.  rivals: two effects to be distinguished, and their
-    ``separation`` by number of poses.  fixed: dimensions of hardware that are not fitted.
+    weakly_observable: as unobservable, left_out, weak of ``Designs``.  rivals: two effects to be distinguished, and
+    their ``separation`` by number of poses.  fixed: dimensions of hardware that are not fitted.
     """
 
     headline = ("robot", "poses", "readings", "exit")

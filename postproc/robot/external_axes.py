@@ -183,7 +183,7 @@ class External:
         placed = self.robot_from_path(rows, share)
         return pose if placed is None else placed.inverse() @ pose
 
-    def begin_from_end(self, rows: Ints) -> Poses:
+    def start_from_end(self, rows: Ints) -> Poses:
         """(K) path axes of the motions before ``rows`` (K,) in those of ``rows``, where these start."""
         values = self.at(rows, np.zeros(len(rows)))
         before = self.carrier[np.maximum(rows - 1, 0)]

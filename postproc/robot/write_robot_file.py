@@ -159,19 +159,19 @@ def _change_entry(entry: CommentedMap, section: YamlSection, effect: WrittenEffe
         extend(entry, "parameters", new)
 
 
-def _unit_word(given: YamlSection, parameter: WrittenParameter) -> str:
+def _unit_word(section: YamlSection, parameter: WrittenParameter) -> str:
     """The word that the file uses for the unit of a parameter; that of the SI where it has none."""
-    if parameter.name in given:
-        word = given.section(parameter.name).text("unit")
+    if parameter.name in section:
+        word = section.section(parameter.name).text("unit")
         if to_si(word, parameter.unit) is not None:
             return word
     return parameter.unit
 
 
-def _same(given: YamlSection, parameter: WrittenParameter, rounding: float = VALUE_DIGITS) -> bool:
+def _same(section: YamlSection, parameter: WrittenParameter, rounding: float = VALUE_DIGITS) -> bool:
     """Whether the file states of a parameter what is meant, within a relative rounding."""
     read = WrittenParameter.of(
-        parameter.name, parameter.unit, parameter_value(given.section(parameter.name), parameter.unit)
+        parameter.name, parameter.unit, parameter_value(section.section(parameter.name), parameter.unit)
     )
     unstated = None if parameter.ci95 is not None else parameter.interval
     pairs = ((read.value, parameter.value), (read.ci95, parameter.ci95), (read.interval, unstated))

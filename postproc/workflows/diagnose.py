@@ -315,7 +315,7 @@ def _values(final: Fit, unknowns: Sequence[Unknown], candidate: Candidate) -> di
 def _offer(request: DiagnoseRequest, measured: Measured, base: Fit) -> CandidateSetups:
     """What was measured with: targets, weights within the payload, scatter; and pulls where there can be such."""
     readings, campaign = measured.readings, measured.campaign
-    in_flange = campaign.tool.rotation @ base.point.given.places[:, :, None]
+    in_flange = campaign.tool.rotation @ base.point.nuisances.places[:, :, None]
     moving = ~campaign.on_base
     loads = within_payload(hung_weights(readings), heaviest(request, measured.robot))
     pulls = pulls_like(readings) if request.pulls else np.zeros((0, 3))

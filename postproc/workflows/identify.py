@@ -105,14 +105,14 @@ def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress
     every = np.ones(len(campaign), bool)
     stage("registering")
     before = fit(campaign, model, (), every)
-    given = before.point.given
+    given = before.point.nuisances
     stage("fitting")
-    after = fit(campaign, asked.model, asked.unknowns, every, request.robust, given=given)
+    after = fit(campaign, asked.model, asked.unknowns, every, request.robust, nuisances=given)
     stage("looking for outliers")
     detected, rows = _outliers(after, request.drop_outliers)
     if request.drop_outliers and detected:
-        before = fit(campaign, model, (), rows, given=given)
-        after = fit(campaign, asked.model, asked.unknowns, rows, request.robust, given=given)
+        before = fit(campaign, model, (), rows, nuisances=given)
+        after = fit(campaign, asked.model, asked.unknowns, rows, request.robust, nuisances=given)
     if not after.unknowns:
         raise Refusal(_no_parameter_identified(measured, after))
     folds = min(request.folds, campaign.poses)
@@ -244,7 +244,7 @@ def _outliers(after: Fit, exclude: bool) -> tuple[tuple[Outlier, ...], Bools]:
         rest[[outlier.row for outlier in new]] = False
         if exclude:
             rows = rest
-            after = fit(after.campaign, after.start, after.asked, rows, given=after.point.given)
+            after = fit(after.campaign, after.start, after.asked, rows, nuisances=after.point.nuisances)
     return tuple(sorted(detected, key=lambda outlier: -outlier.sigmas)), rows
 
 

@@ -17,6 +17,7 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import place
 from postproc.base.read_files import read_file
 from postproc.base.system import relative_path
+from postproc.languages import COMPANION_SUFFIXES
 from postproc.learning.history import (
     DamagedRecord,
     PartHistory,
@@ -173,7 +174,7 @@ def kept_before(program: Path) -> Iterator[None]:
         yield
     except BaseException:
         if kept is not None and not there:
-            for path in (kept, kept.with_suffix(".dat")):
+            for path in (kept, *map(kept.with_suffix, COMPANION_SUFFIXES)):
                 path.unlink(missing_ok=True)
             for folder in (kept.parent, kept.parent.parent):
                 with suppress(OSError):  # it has other programs
@@ -188,9 +189,10 @@ def keep_program(program: Path) -> Path | None:
     raw = read_file(program)
     kept = kept_place(program, hashlib.sha256(raw).hexdigest())
     files = {kept: raw}
-    data = program.with_suffix(".dat")
-    if data.is_file():
-        files[kept.with_suffix(".dat")] = read_file(data)
+    for suffix in COMPANION_SUFFIXES:
+        companion = program.with_suffix(suffix)
+        if companion.is_file():
+            files[kept.with_suffix(suffix)] = read_file(companion)
     missing = {path: content for path, content in files.items() if not path.is_file()}
     if missing:
         write_atomically(missing)

@@ -131,7 +131,7 @@ def read_program(
     dialect = _dialect(path, main.raw, cell)
     companions = dialect.companions(path)
     if any(companion.samefile(path) for companion in companions):
-        name, message = path.with_suffix(".src").name, f"a {path.suffix} file contains the data of a program"
+        name, message = dialect.main_file(path).name, f"a {path.suffix} file contains the data of a program"
         help = f"name {name}: its data are read with it"
         raise Refusal(Finding("FIL009", f"{message}; the program is {name}", str(path), help=help))
     documents = (main, *(read_document(companion) for companion in companions))

@@ -15,7 +15,7 @@ def test_plan(work, measured):
 
 def test_moved(work, measured):
     moved = measured(lambda: edits_of(work))
-    assert not moved.held
+    assert not moved.unwritten
     assert len(Edits.joined(moved.edits)) >= work.motions
 
 

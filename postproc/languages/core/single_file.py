@@ -14,8 +14,13 @@ BEGIN = 65536
 class SingleFileDialect:
     """The part of a ``Dialect`` that asks for no other file."""
 
+    companion_suffixes: tuple[str, ...] = ()
+
     def companions(self, path: Path) -> list[Path]:
         return []
+
+    def main_file(self, companion: Path) -> Path:
+        return companion
 
     def siblings(
         self, program: Program, settings: ReadingSettings, beside: Path | None = None

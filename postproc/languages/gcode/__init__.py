@@ -46,11 +46,18 @@ class GcodeDialect:
         """Those of coordinates, of G and F that hold for inserted blocks too, and of CIP and EX."""
         return b"ABCEFGIJKPRXYZ"
 
+    @property
+    def companion_suffixes(self) -> tuple[str, ...]:
+        return ()
+
     def claims(self, path: Path, raw: bytes) -> bool:
         return detection.CLAIMS[self.name](path, raw)
 
     def companions(self, path: Path) -> list[Path]:
         return []
+
+    def main_file(self, companion: Path) -> Path:
+        return companion
 
     def siblings(
         self, program: Program, settings: ReadingSettings, beside: Path | None = None

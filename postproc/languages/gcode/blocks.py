@@ -275,21 +275,21 @@ def blocks(source: Source, modal: Modal, control: Control, integers: IntegerWord
     return BlockWords(source, modal, control, columns, integers, 0, len(source.blocks))
 
 
-def _targets(given: BlockWords) -> tuple[Bools, Floats, Bools]:
+def _targets(words: BlockWords) -> tuple[Bools, Floats, Bools]:
     """(B, 6) words that are targets, their values [m, rad], and those of them that are differences."""
-    values = [given.lengths(axis) if i < 3 else given.angles(axis) for i, axis in enumerate(AXES)]
-    return (given.motion & ~given.machine)[:, None] & given.present, np.stack(values, axis=1), given.relative
+    values = [words.lengths(axis) if i < 3 else words.angles(axis) for i, axis in enumerate(AXES)]
+    return (words.motion & ~words.machine)[:, None] & words.present, np.stack(values, axis=1), words.relative
 
 
-def tilted(given: BlockWords) -> Bools:
+def tilted(words: BlockWords) -> Bools:
     """(B,) of a whole program: blocks after which rotary axes may be away from 0.
 
     Without a change of the TCP mode that states nothing, and no block is named."""
-    tip = given.modal.force[Group.TCP]
+    tip = words.modal.force[Group.TCP]
     if not len(tip) or (tip == tip[0]).all():
-        return everywhere(False, len(given))
-    target, value, relative = _targets(given)
-    home = given.motion & given.modal.has(Once.HOME)
+        return everywhere(False, len(words))
+    target, value, relative = _targets(words)
+    home = words.motion & words.modal.has(Once.HOME)
     return np.logical_or.accumulate(
         (target[:, 3:] & ((value[:, 3:] != 0) | relative[:, 3:])).any(axis=1) | home
     )
@@ -300,19 +300,19 @@ CYCLES = (73.0, *(float(code) for code in range(81, 90)))
 
 
 def frame_events(
-    given: BlockWords, spoiled: Bools, away: Bools, ends: Floats, lengths: Bools, reasons: Reasons
+    words: BlockWords, spoiled: Bools, away: Bools, ends: Floats, lengths: Bools, reasons: Reasons
 ) -> Course:
     """What the blocks do to the coordinates; why they leave them unknown is put into ``reasons``.
 
     spoiled (B,): blocks before which the base became another one; away (B,): see ``tilted``; ends (B,) [m]: as of
     ``CycleEnds``; lengths (B,): blocks in which another tool length holds than before.
     """
-    modal, n = given.modal, len(given)
+    modal, n = words.modal, len(words)
     force, flow = modal.force, modal.flow
-    present = given.present
-    target, value, relative = _targets(given)
+    present = words.present
+    target, value, relative = _targets(words)
     lost, left = np.zeros((n, 6), np.bool_), np.zeros((n, 6), np.bool_)
-    reason = reasons.of[given.start : given.stop]
+    reason = reasons.of[words.start : words.stop]
     linear = np.arange(6) < 3
 
     def lose(where: Bools, rows: Bools, why: str) -> None:
@@ -328,24 +328,24 @@ def frame_events(
             reason[rows & (reason < 0)] = reasons.number(why)
 
     whole = np.ones(6, np.bool_)
-    move, cycle = given.move, given.motion & (given.move == Move.CYCLE)
+    move, cycle = words.move, words.motion & (words.move == Move.CYCLE)
     unread = target & np.isnan(value)
     lose(unread, np.any(unread, axis=1), What.WORD)
-    lose(whole, given.axis & given.unclear, What.INTEGER)
+    lose(whole, words.axis & words.unclear, What.INTEGER)
     unclear = target & (force[Group.DISTANCE] < 0)[:, None]
     lose(unclear, np.any(unclear, axis=1), What.MODE)
-    home, other = given.motion & modal.has(Once.HOME), np.isin(move, (Move.OTHER,)) & given.motion
+    home, other = words.motion & modal.has(Once.HOME), np.isin(move, (Move.OTHER,)) & words.motion
     lose(present | ~np.any(present, axis=1)[:, None], home, What.REFERENCE)
-    lose(present, given.motion & modal.has(Once.MACHINE), What.MACHINE)
-    lose(whole, given.motion & modal.has(Once.PROBE), What.PROBE)
-    lose(whole, given.axis & modal.unknown, What.CODE)
-    lose(whole, given.axis & modal.unused, What.UNUSED)
-    lose(whole, given.motion & given.twice, What.TWICE)
-    if not given.control.further and given.beside.any():
-        parallel = given.beside
+    lose(present, words.motion & modal.has(Once.MACHINE), What.MACHINE)
+    lose(whole, words.motion & modal.has(Once.PROBE), What.PROBE)
+    lose(whole, words.axis & modal.unknown, What.CODE)
+    lose(whole, words.axis & modal.unused, What.UNUSED)
+    lose(whole, words.motion & words.twice, What.TWICE)
+    if not words.control.further and words.beside.any():
+        parallel = words.beside
         both = np.concatenate([parallel, np.zeros((n, 3), np.bool_)], axis=1)
-        lose(both, parallel.any(axis=1) & given.motion & ~home, What.PARALLEL)
-    lose(whole, other | (given.motion & (np.abs(force[Group.MACRO]) == 1)), What.OTHER)
+        lose(both, parallel.any(axis=1) & words.motion & ~home, What.PARALLEL)
+    lose(whole, other | (words.motion & (np.abs(force[Group.MACRO]) == 1)), What.OTHER)
     if cycle.any():
         # Words of a cycle give where it works.
         depth = np.array([2, 1, 0])[np.clip(force[Group.PLANE], 0, 2)]
@@ -356,31 +356,31 @@ def frame_events(
         at_level = cycle & np.isfinite(ends)
         target |= at_level[:, None] & deep
         value = np.where(at_level[:, None] & deep, ends[:, None], value)
-        repeats = given.has(key("L")) | given.has(key("K"))
+        repeats = words.has(key("L")) | words.has(key("K"))
         lose(deep, cycle & ~at_level, What.CYCLE)
         lose(linear, cycle & (force[Group.PLANE] < 0), What.CYCLE)
         lose(whole, cycle & repeats & (force[Group.DISTANCE] != 0), What.CYCLE)
-    if (move < 0).any() and np.isin(given.source.column(key("G")).value, CYCLES).any():
+    if (move < 0).any() and np.isin(words.source.column(key("G")).value, CYCLES).any():
         # perhaps a cycle, which ends elsewhere along the axis in which it works
-        lose(linear, given.motion & (move < 0), What.CYCLE)
-    lose(present, given.motion & (flow.reason != FlowReason.NONE), What.UNCERTAIN)
-    lose(whole, given.noted("unknown"), What.TEXT)
-    if (called := given.noted("cycle")).any():
+        lose(linear, words.motion & (move < 0), What.CYCLE)
+    lose(present, words.motion & (flow.reason != FlowReason.NONE), What.UNCERTAIN)
+    lose(whole, words.noted("unknown"), What.TEXT)
+    if (called := words.noted("cycle")).any():
         single = np.zeros((n, 6), np.bool_)
         single[np.arange(n), np.array([2, 1, 0])[np.clip(force[Group.PLANE], 0, 2)]] = True
-        retracting = () if given.control.retract is None else (given.control.retract,)
-        at_plane = called & given.has(*retracting) & np.isfinite(ends)
+        retracting = () if words.control.retract is None else (words.control.retract,)
+        at_plane = called & words.has(*retracting) & np.isfinite(ends)
         target |= at_plane[:, None] & single
         value = np.where(at_plane[:, None] & single, ends[:, None], value)
         lose(linear, called & ~at_plane, What.CYCLE)
-    leave(linear, given.noted("swivel"), What.SWIVEL)
-    lose(whole, given.noted("corner", "axis", "polar"), What.OTHER)
+    leave(linear, words.noted("swivel"), What.SWIVEL)
+    lose(whole, words.noted("corner", "axis", "polar"), What.OTHER)
     leave(whole, flow.forget, What.CALL)
 
     leave(linear, modal.switched(Group.OFFSET) | spoiled, What.BASE)
     for group in FRAMED:
         if force[group].any() or modal.ahead[group]:
-            lose(whole, (force[group] != 0) & given.motion, What.FRAME)
+            lose(whole, (force[group] != 0) & words.motion, What.FRAME)
             leave(whole, modal.switched(group), What.FRAME)
     # With the rotary axes at 0 the words mean the same with and without a TCP mode.
     leave(linear, modal.switched(Group.TCP) & away, What.TIP)

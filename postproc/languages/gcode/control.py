@@ -171,7 +171,7 @@ class Event:
     position: Floats
 
 
-def kept(event: Event) -> ProgrammedFrame:
+def keep_frame(event: Event) -> ProgrammedFrame:
     """The frame as it was: of a control without codes that change it."""
     return event.frame
 
@@ -213,7 +213,7 @@ class Control:
     cycle_apart: bool = False
     increments: bool = False
     turns: tuple[int, int] = (key("P"), 1)
-    frame: Callable[[Event], ProgrammedFrame] = kept
+    frame: Callable[[Event], ProgrammedFrame] = keep_frame
     columns: tuple[int, ...] = ()
     angles: tuple[tuple[int, int], ...] = ((2, 2), (1, 1), (0, 0))
     whole: bool = False

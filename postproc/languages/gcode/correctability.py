@@ -66,7 +66,7 @@ NUMBERS = (*AXES, *(key(letter) for letter in "IJKR"))
 
 
 def check_correctability(
-    given: BlockWords,
+    words: BlockWords,
     moves: GcodeMotions,
     where: Positions,
     base: Ints,
@@ -81,7 +81,7 @@ def check_correctability(
     values are not known.
     """
     rows = moves.block
-    refuse, modal = collector.refuse, given.modal
+    refuse, modal = collector.refuse, words.modal
     force = {group: values[rows] for group, values in modal.force.items()}
     for uncertainty, (code, message) in FLOW_MESSAGES.items():
         refuse(modal.flow.reason[rows] == uncertainty, code, message)
@@ -96,9 +96,9 @@ def check_correctability(
     refuse(modal.has(Once.HOME)[rows], "GCO004", "the block leads to the reference point")
     refuse(modal.has(Once.MACHINE)[rows], "GCO004", "the block uses machine coordinates")
     refuse(modal.has(Once.PROBE)[rows], "GCO011", "the block is a probing move: its end is not known")
-    _codes(given, rows, collector)
+    _codes(words, rows, collector)
     refuse(modal.unused[rows], "GCO001", UNUSED)
-    refuse(given.twice[rows], "GCO017", "a word occurs twice in the block")
+    refuse(words.twice[rows], "GCO017", "a word occurs twice in the block")
     refuse(modal.twice[rows], "GCO017", "two codes of the block select different motions")
     for kind, code, message in (
         ("unknown", "GCO001", "the block is not understood"),
@@ -107,23 +107,23 @@ def check_correctability(
         ("axis", "GCO004", "the block names axes of the machine"),
         ("polar", "GCO010", "the coordinates are polar"),
     ):
-        refuse(given.noted(kind)[rows], code, message)
+        refuse(words.noted(kind)[rows], code, message)
     refuse(
-        np.any(given.beside[rows], axis=1) & (not given.control.further),
+        np.any(words.beside[rows], axis=1) & (not words.control.further),
         "GCO016",
         "the block has U, V or W: they are further axes, or steps of a lathe",
     )
     refuse(
-        given.unclear[rows],
+        words.unclear[rows],
         "GCO022",
         "a length without a decimal point is mm or an increment: the program has both kinds of words",
     )
-    unread = np.zeros(len(given), np.bool_)
+    unread = np.zeros(len(words), np.bool_)
     for one in NUMBERS:
-        column = given.words(one)
+        column = words.words(one)
         unread[column.block[column.how == How.UNREAD]] = True
-    turns = given.words(given.control.turns[0])
-    unread[turns.block[(turns.how == How.UNREAD) & _bent(given.move[turns.block])]] = True
+    turns = words.words(words.control.turns[0])
+    unread[turns.block[(turns.how == How.UNREAD) & _is_arc(words.move[turns.block])]] = True
     refuse(
         unread[rows],
         "GCO005",
@@ -157,11 +157,11 @@ def check_correctability(
     refuse(base < 0, "GCO014", "the work offset is not known, or the program itself writes it")
     refuse(tool < 0, "GCO015", "no tool is loaded, or its number or length is not known")
     refuse(force[Group.UNITS] < 0, "GCO002", "mm or inch is not known")
-    _positions(given, moves, where, collector, reasons)
+    _positions(words, moves, where, collector, reasons)
     for wrong, message in ARCS.items():
         refuse(moves.arcs.wrong == wrong, "GCO012", message)
     refuse(moves.arcs.wrong == 1, "GCO012", "the start of the arc is not known")
-    centred = _bent(moves.move) & given.has(*(key(letter) for letter in "IJK"))[rows]
+    centred = _is_arc(moves.move) & words.has(*(key(letter) for letter in "IJK"))[rows]
     refuse(
         centred & (force[Group.ARCS] < 0),
         "GCO012",
@@ -175,15 +175,15 @@ def check_correctability(
     refuse(moves.tool_orientation.wrong == 2, "GCO013", "a rotary axis that the program uses is not set yet")
 
 
-def _bent(move: Ints) -> Bools:
+def _is_arc(move: Ints) -> Bools:
     return np.isin(move, (Move.CLOCKWISE, Move.COUNTER, Move.THROUGH))
 
 
-def _codes(given: BlockWords, rows: Ints, collector: RefusalCollector) -> None:
+def _codes(words: BlockWords, rows: Ints, collector: RefusalCollector) -> None:
     """Refuses motions in blocks with a code that is not known, by that code."""
-    some = np.flatnonzero(given.modal.unknown[rows])
+    some = np.flatnonzero(words.modal.unknown[rows])
     if len(some):
-        codes = given.modal.unknown_codes.last(rows[some], absent=-1.0)
+        codes = words.modal.unknown_codes.last(rows[some], absent=-1.0)
         values, which = np.unique(np.nan_to_num(codes, nan=-1.0), return_inverse=True)
         messages = [(named := code_name(value), f"{named} is not known here") for value in values.tolist()]
         collector.refuse_each(
@@ -196,7 +196,7 @@ def code_name(value: float) -> str:
 
 
 def _positions(
-    given: BlockWords, moves: GcodeMotions, where: Positions, collector: RefusalCollector, reasons: Reasons
+    words: BlockWords, moves: GcodeMotions, where: Positions, collector: RefusalCollector, reasons: Reasons
 ) -> None:
     """Refuses motions whose end is not known, by what left it unknown."""
     rows = moves.block
@@ -216,7 +216,7 @@ def _positions(
             why = (
                 "is never set before"
                 if cause < 0
-                else f"not known since line {given.source.blocks.line[cause]}"
+                else f"not known since line {words.source.blocks.line[cause]}"
             )
             what = "" if cause < 0 or reasons.of[cause] < 0 else reasons.texts[reasons.of[cause]]
             if cause >= 0 and not what:
@@ -243,17 +243,17 @@ def bind_names(execution: Execution) -> str:
 
 def locked_rows(
     document: Document,
-    given: BlockWords,
+    words: BlockWords,
     built: Built,
     collector: RefusalCollector,
     execution: Execution,
     levels: Ints,
 ) -> Refusals:
-    """Motions whose end a refused motion, an origin or other code builds on; ``given``: the whole program; levels (K,):
+    """Motions whose end a refused motion, an origin or other code builds on; ``words``: the whole program; levels (K,):
     blocks to whose level a drill cycle goes back."""
     rows, n = built.block, len(built.block)
     pins = RefusalCollector(n)
-    modal = given.modal
+    modal = words.modal
     refused = collector.why >= 0
     if refused.any():
         partial = ~built.sets.all(axis=1)
@@ -268,21 +268,21 @@ def locked_rows(
             "GCO002",
             "the motion after it depends on this end point and is not corrected",
         )
-    shifting = modal.has(Once.SHIFT) & given.has(*AXES)
+    shifting = modal.has(Once.SHIFT) & words.has(*AXES)
     for at, message in (
         (np.flatnonzero(shifting), "G92 sets the origin at this end point"),
         (levels, "the drill cycle after it goes back to the level of this end point"),
         (np.flatnonzero(modal.flow.calls), "code that is not read may depend on this end point"),
         (_reading(document, execution) - 1, "a variable after it reads the end position of this motion"),
         (
-            np.flatnonzero(given.noted("unknown")),
+            np.flatnonzero(words.noted("unknown")),
             "a block that is not understood may depend on this end point",
         ),
     ):
         before = np.searchsorted(rows, at, side="right") - 1
         before = before[before >= 0]
         pins.refuse(_mask(n, before) & (collector.why < 0), "GCO002", message)
-    blocks = given.source.blocks
+    blocks = words.source.blocks
     return pins.done(document, blocks.line[rows], blocks.start[rows], blocks.start[rows])
 
 
@@ -290,18 +290,18 @@ _WAY = tuple(key(letter, index) for letter in "ABCIJK" for index in (1, 2, 3))
 """Words of the way itself: the point between, orientations."""
 
 
-def no_insert_before(given: BlockWords, rows: Ints, foreign: Bools) -> dict[int, str]:
+def no_insert_before(words: BlockWords, rows: Ints, foreign: Bools) -> dict[int, str]:
     """Motions, in the blocks ``rows`` (N,), before which nothing may be inserted, because their block says more than
     the motion, or is in another file (``foreign`` (B,))."""
-    modal = given.modal
-    more = modal.more | given.noted("assign", "corner", "axis", "polar")
-    others = (one for one in given.control.columns if one not in _WAY)
-    more |= given.has(*(key(letter) for letter in "ESTHDLQUVWM"), *others)
-    word, usual = given.control.turns
-    if word in given.columns:
-        more |= given.number(word) > usual
+    modal = words.modal
+    more = modal.more | words.noted("assign", "corner", "axis", "polar")
+    others = (one for one in words.control.columns if one not in _WAY)
+    more |= words.has(*(key(letter) for letter in "ESTHDLQUVWM"), *others)
+    word, usual = words.control.turns
+    if word in words.columns:
+        more |= words.number(word) > usual
     # Machine axes: what is inserted has no words for them.
-    more |= given.has(*(key(letter) for letter in "ABC")) & (modal.force[Group.TCP] != 1)
+    more |= words.has(*(key(letter) for letter in "ABC")) & (modal.force[Group.TCP] != 1)
     timed = modal.force[Group.FEED] == Feed.INVERSE_TIME
     found: dict[int, str] = {}
     for mask, why in (
@@ -309,7 +309,7 @@ def no_insert_before(given: BlockWords, rows: Ints, foreign: Bools) -> dict[int,
         (foreign, "its block is in another file"),
         (more, "its block contains more than the motion"),
         (modal.flow.entered, "a jump leads to its block"),
-        (feeds_before_units(given), "its F is in the unit from before it"),
+        (feeds_before_units(words), "its F is in the unit from before it"),
     ):
         found.update(dict.fromkeys(np.flatnonzero(mask[rows]).tolist(), why))
     return found

@@ -39,11 +39,11 @@ KNOWN_M = (
 
 
 def diagnostics(
-    document: Document, given: BlockWords, rows: Ints, loaded: Ints, named: bool, settings: ReadingSettings
+    document: Document, words: BlockWords, rows: Ints, loaded: Ints, named: bool, settings: ReadingSettings
 ) -> list[Finding]:
     """Findings that belong to no motion; ``rows``: blocks of the motions; loaded (B,): number of the
     tool in force; ``named``: the program names one."""
-    blocks, modal = given.source.blocks, given.modal
+    blocks, modal = words.source.blocks, words.modal
     findings: list[Finding] = []
     live = modal.flow.tape & (modal.flow.reason != FlowReason.ENDED)
 
@@ -62,11 +62,11 @@ def diagnostics(
             )
             findings.append(Finding(code, message + many, str(document.path), int(blocks.line[at[0]]), 1))
 
-    none = np.zeros(len(given), np.bool_)
-    motion = given.motion
-    text = given.noted("unknown") & ~motion
+    none = np.zeros(len(words), np.bool_)
+    motion = words.motion
+    text = words.noted("unknown") & ~motion
     if text.any():
-        said = next(note.text for note in given.source.notes if note.kind == "unknown" and text[note.block])
+        said = next(note.text for note in words.source.notes if note.kind == "unknown" and text[note.block])
         add(text, "GCO001", f"{said[:60]!r} is not understood")
     strange = modal.unknown_codes.block[~motion[modal.unknown_codes.block] & live[modal.unknown_codes.block]]
     codes = np.nan_to_num(modal.unknown_codes.last(strange), nan=-1.0)
@@ -75,11 +75,11 @@ def diagnostics(
     add(modal.unused & ~motion, "GCO001", UNUSED)
     probing = modal.has(Once.PROBE) & ~motion
     add(probing, "GCO001", "the block is a probing move without axes")
-    calls, m = none.copy(), given.words(key("M"))
+    calls, m = none.copy(), words.words(key("M"))
     calls[m.block[np.isin(m.value, CALLS)]] = True
-    calls |= modal.has(Once.CALL) | given.noted("call") | given.has(*given.control.calls)
+    calls |= modal.has(Once.CALL) | words.noted("call") | words.has(*words.control.calls)
     add(calls & ~modal.flow.called, "GCO007", "the block calls code that is not read")
-    add(given.noted("cycle"), "GCO008", "the block calls a cycle of the control")
+    add(words.noted("cycle"), "GCO008", "the block calls a cycle of the control")
     strange_m = ~np.isin(m.value, KNOWN_M) & live[m.block]
     if strange_m.any():
         names = [f"M{value:g}" for value in np.unique(m.value[strange_m & np.isfinite(m.value)]).tolist()]
@@ -90,22 +90,22 @@ def diagnostics(
             "GCO028",
             f"{shown} {verb} not known here; it is assumed that no axis moves",
         )
-    setting = modal.has(Once.SETTING) & given.has(*AXES, key("L"), key("P"), key("R"))
+    setting = modal.has(Once.SETTING) & words.has(*AXES, key("L"), key("P"), key("R"))
     add(setting, "GCO024", "the program writes offsets or tools")
     add(
-        given.noted("base"),
+        words.noted("base"),
         "GCO024",
         "the program writes a work offset; the cell's base of its number is used",
     )
-    data = given.noted("tool data")
-    data[[block for block, _ in written_lengths(given)]] = True
+    data = words.noted("tool data")
+    data[[block for block, _ in written_lengths(words)]] = True
     add(
         data,
         "GCO024",
         "the program writes data of tools; the cell's tool of the same number is used",
     )
     named_tools: dict[str, list[int]] = {}
-    for note in given.source.notes:
+    for note in words.source.notes:
         if note.kind == "tool":
             named_tools.setdefault(note.text, []).append(note.block)
     for name, at in named_tools.items():
@@ -113,7 +113,7 @@ def diagnostics(
     if not len(rows):
         return findings
     uncertain = np.isin(modal.flow.reason, (FlowReason.DELETED, FlowReason.FLOW))
-    ends = m.block[np.isin(m.value, [*given.control.endings]) & uncertain[m.block]]
+    ends = m.block[np.isin(m.value, [*words.control.endings]) & uncertain[m.block]]
     after = rows[(rows > ends[0]) & (modal.flow.reason[rows] == FlowReason.NONE)] if len(ends) else ends
     if len(after):
         lines = f"lines {blocks.line[after[0]]} to {blocks.line[after[-1]]}"
@@ -124,21 +124,21 @@ def diagnostics(
         add(first, "GCO020", "no code selects mm or inch; mm is assumed")
     if not named:
         add(first, "GCO021", "the program names no tool; tool 1 of the cell is assumed")
-    if given.integers.message:
+    if words.integers.message:
         whole = none.copy()
-        hows = np.stack([given.how(axis) for axis in AXES[:3]], axis=1) == How.INTEGER
-        values = np.stack([given.number(axis) for axis in AXES[:3]], axis=1)
+        hows = np.stack([words.how(axis) for axis in AXES[:3]], axis=1) == How.INTEGER
+        values = np.stack([words.number(axis) for axis in AXES[:3]], axis=1)
         whole[rows] = (hows & (values != 0))[rows].any(axis=1)
-        add(whole, "GCO027", given.integers.message)
-    if settings.integer_words == "um" and not given.control.increments:
+        add(whole, "GCO027", words.integers.message)
+    if settings.integer_words == "um" and not words.control.increments:
         whole = none.copy()
-        hows = np.stack([given.how(axis) for axis in AXES[:3]], axis=1) == How.INTEGER
+        hows = np.stack([words.how(axis) for axis in AXES[:3]], axis=1) == How.INTEGER
         whole[rows] = hows[rows].any(axis=1)
-        add(whole, "GCO022", f"words without a decimal point are mm or inch in {given.control.name}")
-    height = given.number(key("H"))
+        add(whole, "GCO022", f"words without a decimal point are mm or inch in {words.control.name}")
+    height = words.number(key("H"))
     other = (height > 0) & (modal.force[Group.LENGTH] == 1) & (height != loaded) & (loaded > 0)
-    if given.control.offsets is not None:
-        edges = given.number(given.control.offsets) > 1
+    if words.control.offsets is not None:
+        edges = words.number(words.control.offsets) > 1
         add(edges, "GCO023", "D is not the first edge of the tool; the length of the cell's tool is used")
     add(other, "GCO023", "H has another number than the tool; the length of the cell's tool is used")
     return findings

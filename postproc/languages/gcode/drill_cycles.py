@@ -64,25 +64,25 @@ class DrillCycles:
         )
 
 
-def drill_cycles(given: BlockWords, events: Ints, rebased: Bools, lengths: Bools) -> DrillCycles:
+def drill_cycles(words: BlockWords, events: Ints, rebased: Bools, lengths: Bools) -> DrillCycles:
     """Of a whole program; events (E,): blocks that change the frame; rebased, lengths (B,): those before which the
     base, or the tool's length, became another one."""
-    n = len(given)
-    cycle = given.motion & (given.move == Move.CYCLE)
+    n = len(words)
+    cycle = words.motion & (words.move == Move.CYCLE)
     rows = np.flatnonzero(cycle)
     if not len(rows):
         unknown, none = everywhere(np.nan, n), everywhere(False, n)
         return DrillCycles(unknown, unknown, none, everywhere(2, n, np.int8), everywhere(HIDDEN, n, np.int8))
-    axis = np.array([2, 1, 0])[np.clip(given.modal.force[Group.PLANE], 0, 2)]
-    chain, drills = _chains(given, rows, axis, events, rebased | lengths)
-    depth, stated = _sticky(given, rows, chain, axis)
-    plane, _ = _sticky(given, rows, chain, None)
+    axis = np.array([2, 1, 0])[np.clip(words.modal.force[Group.PLANE], 0, 2)]
+    chain, drills = _chains(words, rows, axis, events, rebased | lengths)
+    depth, stated = _sticky(words, rows, chain, axis)
+    plane, _ = _sticky(words, rows, chain, None)
     why = np.full(n, HIDDEN, np.int8)
     why[rows] = np.select(
         [
-            ~drills | (given.modal.force[Group.PLANE][rows] < 0),
-            given.modal.force[Group.DISTANCE][rows] != 0,
-            ~_once(given, rows),
+            ~drills | (words.modal.force[Group.PLANE][rows] < 0),
+            words.modal.force[Group.DISTANCE][rows] != 0,
+            ~_once(words, rows),
             ~np.isfinite(depth),
             ~np.isfinite(plane),
             ~(depth < plane),
@@ -97,40 +97,40 @@ def drill_cycles(given: BlockWords, events: Ints, rebased: Bools, lengths: Bools
     return result
 
 
-def _chains(given: BlockWords, rows: Ints, axis: Ints, events: Ints, apart: Bools) -> tuple[Ints, Bools]:
+def _chains(words: BlockWords, rows: Ints, axis: Ints, events: Ints, apart: Bools) -> tuple[Ints, Bools]:
     """Of the cycles ``rows`` (K,): number of the stretch in which words of one hold for the next; whether a code that
     drills is in force."""
-    modal = given.modal
-    codes = given.words(key("G"))
+    modal = words.modal
+    codes = words.words(key("G"))
     tens = np.rint(codes.value * 10)
-    of_cycles = [code for code, says in given.control.codes.items() if says == (Group.MOTION, Move.CYCLE)]
+    of_cycles = [code for code, says in words.control.codes.items() if says == (Group.MOTION, Move.CYCLE)]
     selects = np.isin(tens, of_cycles)
     at = np.searchsorted(codes.block[selects], rows, side="right") - 1
     selected = np.append(tens[selects], -1)[at]
     breaks = (
-        (given.move != Move.CYCLE) | leaves_unknown(given, apart) | (modal.flow.reason != FlowReason.NONE)
+        (words.move != Move.CYCLE) | leaves_unknown(words, apart) | (modal.flow.reason != FlowReason.NONE)
     )
     breaks |= switched(axis, int(axis[0])) | modal.switched(Group.UNITS) | modal.switched(Group.DISTANCE)
     breaks[events] = True
     interrupted = np.cumsum(breaks)[rows]
     new = (selected[1:] != selected[:-1]) | (interrupted[1:] != interrupted[:-1])
-    drills = np.isin(selected, [10 * code for code in given.control.drills])
+    drills = np.isin(selected, [10 * code for code in words.control.drills])
     return np.append(0, np.cumsum(new)), drills
 
 
-def _sticky(given: BlockWords, rows: Ints, chain: Ints, axis: Ints | None) -> tuple[Floats, Bools]:
+def _sticky(words: BlockWords, rows: Ints, chain: Ints, axis: Ints | None) -> tuple[Floats, Bools]:
     """(K,) [m] the coordinate that holds along ``axis`` (B,), or R, at the cycles ``rows`` (K,); whether the block
     states it."""
     if axis is None:
-        value, how = given.lengths(key("R"))[rows], given.how(key("R"))[rows]
+        value, how = words.lengths(key("R"))[rows], words.how(key("R"))[rows]
     else:
         value, how = np.full(len(rows), np.nan), np.full(len(rows), -1)
         for number, letter in enumerate(AXES[:3]):
             mine = axis[rows] == number
-            value[mine], how[mine] = given.lengths(letter)[rows[mine]], given.how(letter)[rows[mine]]
+            value[mine], how[mine] = words.lengths(letter)[rows[mine]], words.how(letter)[rows[mine]]
     stated = how >= 0
-    modal = given.modal
-    odd = given.twice | modal.unknown | modal.unused | (modal.flow.reason != FlowReason.NONE)
+    modal = words.modal
+    odd = words.twice | modal.unknown | modal.unused | (modal.flow.reason != FlowReason.NONE)
     value = np.where(np.isin(how, (How.NUMBER, How.INTEGER)) & ~odd[rows], value, np.nan)
     first = np.append(True, chain[1:] != chain[:-1])
     last = np.maximum.accumulate(np.where(stated | first, np.arange(len(rows)), 0))
@@ -179,10 +179,10 @@ def beside_holes(drills: Bools) -> dict[int, str]:
     return found | dict.fromkeys(np.flatnonzero(drills).tolist(), "its block is a drill cycle")
 
 
-def _once(given: BlockWords, rows: Ints) -> Bools:
+def _once(words: BlockWords, rows: Ints) -> Bools:
     """(K,) cycles that run once: K and L, where they are stated, are 1."""
     once = np.ones(len(rows), np.bool_)
     for letter in "KL":
-        value = given.number(key(letter))[rows]
-        once &= (given.how(key(letter))[rows] < 0) | (value == 1)
+        value = words.number(key(letter))[rows]
+        once &= (words.how(key(letter))[rows] < 0) | (value == 1)
     return once

@@ -16,20 +16,20 @@ EXTERNAL = tuple(key("E", number) for number in range(1, 7))
 _LETTERS = frozenset(key(one) for one in "XYZABCUVWEQ")
 
 
-def external_axes(given: BlockWords, rows: Ints) -> Floats:
+def external_axes(block_words: BlockWords, rows: Ints) -> Floats:
     """(N, 6) [mm or deg] where E1..E6 are after the blocks ``rows`` (N,) of the motions, see ``Toolpath``.
 
     COMPUTED where a word is no number, is a step, or is in inches (whether the axis is linear is not said).
     """
-    if not any(one in given.source.columns for one in EXTERNAL):
+    if not any(one in block_words.source.columns for one in EXTERNAL):
         return np.broadcast_to(np.nan, (len(rows), 6))
-    steps, metric = given.modal.force[Group.DISTANCE] != 0, given.length == MM
+    steps, metric = block_words.modal.force[Group.DISTANCE] != 0, block_words.length == MM
     found = np.full((len(rows), 6), np.nan)
     for axis, one in enumerate(EXTERNAL):
-        said = np.full(len(given), np.nan)
-        said[given.modal.flow.forget] = LOST  # what was called may have moved it
-        if one in given.source.columns:
-            words = given.words(one)
+        said = np.full(len(block_words), np.nan)
+        said[block_words.modal.flow.forget] = LOST  # what was called may have moved it
+        if one in block_words.source.columns:
+            words = block_words.words(one)
             read = metric[words.block] & np.isin(words.how, (How.NUMBER, How.INTEGER, How.ABSOLUTE))
             read &= (words.how == How.ABSOLUTE) | ~steps[words.block]
             said[words.block] = np.where(read & np.isfinite(words.value), words.value, COMPUTED)
@@ -48,11 +48,11 @@ def moves_external(external: Floats) -> dict[int, str]:
     return dict.fromkeys(np.flatnonzero(moves).tolist(), "an external axis moves in its block")
 
 
-def others_move(given: BlockWords) -> Bools:
+def others_move(words: BlockWords) -> Bools:
     """(B,) the first block that brings an axis beside those that are read, and E1..E6, to another place than zero."""
-    moving = np.zeros(len(given), np.bool_)
-    for one, column in given.source.columns.items():
-        named = one % 256 in _LETTERS and 256 <= one < 1 << 14 and one not in (*given.columns, *EXTERNAL)
+    moving = np.zeros(len(words), np.bool_)
+    for one, column in words.source.columns.items():
+        named = one % 256 in _LETTERS and 256 <= one < 1 << 14 and one not in (*words.columns, *EXTERNAL)
         if named or one in SECOND:
             away = column.block[column.value != 0.0]
             moving[away[:1]] = True

@@ -13,28 +13,28 @@ from postproc.languages.gcode.source import WordColumn
 from postproc.languages.gcode.words import key
 
 
-def feeds_before_units(given: BlockWords) -> Bools:
+def feeds_before_units(words: BlockWords) -> Bools:
     """(B,) blocks whose F is in the unit from before them, as they select another one."""
-    units = given.modal.units
-    if not given.control.feed_before_units:
-        return np.zeros(len(given), np.bool_)
-    return np.asarray(given.modal.switched(Group.UNITS) & (np.cumsum(units) > units) & given.has(key("F")))
+    units = words.modal.units
+    if not words.control.feed_before_units:
+        return np.zeros(len(words), np.bool_)
+    return np.asarray(words.modal.switched(Group.UNITS) & (np.cumsum(units) > units) & words.has(key("F")))
 
 
 class Feeds:
     """F and S of a program, as they hold on."""
 
-    def __init__(self, given: BlockWords) -> None:
+    def __init__(self, words: BlockWords) -> None:
         # F and S of a dwell are times (G4 F2).
-        self._dwell = given.modal.has(Once.DWELL)
-        self._force, self._given = given.modal.force, given
-        self._unit = lookup(self._force[given.control.feed_units], np.array([MM, INCH, np.nan]))
-        late = np.flatnonzero(feeds_before_units(given))
+        self._dwell = words.modal.has(Once.DWELL)
+        self._force, self._given = words.modal.force, words
+        self._unit = lookup(self._force[words.control.feed_units], np.array([MM, INCH, np.nan]))
+        late = np.flatnonzero(feeds_before_units(words))
         if len(late):
             unit = np.array(self._unit)
             unit[late] = self._unit[late - 1]
             self._unit = unit
-        self._rate, self._spindle = (self._outside(given.words(key(letter))) for letter in "FS")
+        self._rate, self._spindle = (self._outside(words.words(key(letter))) for letter in "FS")
 
     def _outside(self, column: WordColumn) -> WordColumn:
         keep = ~self._dwell[column.block]
@@ -89,17 +89,17 @@ _FLOW = (2.0, 17.0, 30.0, 97.0, 98.0, 99.0)
 """M that say where the program goes on or ends; what is called is followed."""
 
 
-def with_stops(blend: Floats, given: BlockWords, rows: Ints) -> Floats:
+def with_stops(blend: Floats, words: BlockWords, rows: Ints) -> Floats:
     """(N,) [m] ``blend`` (N,) of the motions in blocks ``rows`` (N,), as of ``blends``, but 0 where the control stops
     after a motion whatever its path mode, because a dwell or a halt is behind it, and NaN where it may: controls differ
     in whether they blend over other M and tools."""
-    codes = given.words(key("M"))
+    codes = words.words(key("M"))
     called = np.isin(codes.value, _FLOW)
     halts = np.isin(codes.value, _HALTS)
-    before_dwell = np.searchsorted(rows, np.flatnonzero(given.modal.has(Once.DWELL)), side="left") - 1
+    before_dwell = np.searchsorted(rows, np.flatnonzero(words.modal.has(Once.DWELL)), side="left") - 1
     before_halt = np.searchsorted(rows, codes.block[halts], side="right") - 1
     stops = np.concatenate([before_dwell, before_halt])
-    unclear = np.concatenate([codes.block[~halts & ~called], given.words(key("T")).block])
+    unclear = np.concatenate([codes.block[~halts & ~called], words.words(key("T")).block])
     maybe = np.concatenate([np.searchsorted(rows, unclear, side=side) - 1 for side in ("left", "right")])
     stops, maybe = stops[stops >= 0], maybe[maybe >= 0]
     stops, maybe = stops[blend[stops] != 0.0], maybe[blend[maybe] > 0.0]
@@ -117,16 +117,16 @@ def _latest(column: WordColumn, blocks: Ints) -> tuple[Ints, Floats]:
     return np.maximum(np.append(column.block, -1)[at], 0), np.append(column.value, np.nan)[at]
 
 
-def blend_tolerances(given: BlockWords) -> tuple[Ints, Floats]:
+def blend_tolerances(words: BlockWords) -> tuple[Ints, Floats]:
     """Blocks with a G64 (K,), and what its P allows [m] (K,), NaN where nothing bounds it."""
-    codes = given.words(key("G"))
+    codes = words.words(key("G"))
     says = codes.block[codes.value == 64.0]
-    return says, given.lengths(key("P"))[says] if len(says) else np.empty(0)
+    return says, words.lengths(key("P"))[says] if len(says) else np.empty(0)
 
 
-def blends(given: BlockWords, rows: Ints, allowed: tuple[Ints, Floats]) -> Floats:
+def blends(words: BlockWords, rows: Ints, allowed: tuple[Ints, Floats]) -> Floats:
     """(N,) [m] of the motions in blocks ``rows`` (N,): 0 in exact modes, else ``allowed`` (K,), as ``blend_tolerances``
     gives it."""
-    path = given.modal.force[Group.PATH][rows]
-    at = np.searchsorted(allowed[0], rows + given.start, side="right") - 1
+    path = words.modal.force[Group.PATH][rows]
+    at = np.searchsorted(allowed[0], rows + words.start, side="right") - 1
     return np.where(path == 0, 0.0, np.where(path == 1, np.append(allowed[1], np.nan)[at], np.nan))

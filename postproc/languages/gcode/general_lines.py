@@ -54,8 +54,8 @@ def line(text: bytes) -> LexedLine:
     words: list[tuple[int, int, int, int, float, int]] = []
     notes: list[tuple[str, str]] = []
 
-    def note(kind: str, said: bytes) -> None:
-        notes.append((kind, said.decode("latin-1")))
+    def note(kind: str, text: bytes) -> None:
+        notes.append((kind, text.decode("latin-1")))
 
     place, deleted = 0, False
     codes: set[int] = set()

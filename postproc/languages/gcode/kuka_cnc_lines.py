@@ -51,8 +51,8 @@ class KukaCncLines:
         words: list[tuple[int, int, int, int, float, int]] = []
         notes: list[tuple[str, str]] = []
 
-        def note(kind: str, said: bytes) -> None:
-            notes.append((kind, said.decode("latin-1")))
+        def note(kind: str, text: bytes) -> None:
+            notes.append((kind, text.decode("latin-1")))
 
         def word(at: int, address: int, start: int, stop: int, value: float, how: int) -> None:
             words.append((at, address, start, stop, value, how))

@@ -117,7 +117,7 @@ def modal(execution: Execution, control: Control, base: int | None = None) -> Mo
     n = len(source.blocks)
     codes = source.column(key("G"))
     blocks = codes.block
-    number, inside, groups, values = said(codes.value, control)
+    number, inside, groups, values = decode_g_codes(codes.value, control)
 
     once = np.zeros(n, np.int32)
     for code in np.unique(values[groups == Group.ONCE]).tolist():
@@ -207,7 +207,7 @@ def _unused(
     return unused
 
 
-def said(codes: Floats, control: Control) -> tuple[Ints, Bools, Ints, Ints]:
+def decode_g_codes(codes: Floats, control: Control) -> tuple[Ints, Bools, Ints, Ints]:
     """Of G codes (K,): ten times their number (K,), whether a control may have it (K,); its Group (K,), -1 if it is not
     known there, and what it says of that (K,)."""
     number, known = _numbers(codes)

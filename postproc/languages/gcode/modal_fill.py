@@ -87,7 +87,7 @@ class FilledRows:
             same |= np.isnan(values) & np.isnan(one)
         return bool(same.all())
 
-    def taken(self, name: str) -> NDArray[Any]:
+    def take_column(self, name: str) -> NDArray[Any]:
         """The column (N, ...), read-only; it is let go here."""
         if name not in self._many:
             return everywhere(self._one[name], self._count)

@@ -63,10 +63,10 @@ class WorkOffsets:
     stated: tuple[StatedOffset, ...]
 
 
-def work_offsets(given: BlockWords) -> WorkOffsets:
+def work_offsets(words: BlockWords) -> WorkOffsets:
     """The cell's offsets, with those that the program writes by G10 L2 and L20, or by variables that are offsets."""
-    n, base = len(given), given.modal.force[Group.OFFSET]
-    events = _offset_events(given)
+    n, base = len(words), words.modal.force[Group.OFFSET]
+    events = _offset_events(words)
     if not events:
         return WorkOffsets(base, everywhere(False, n), ())
     changed = np.zeros(n + 1, np.bool_)
@@ -114,30 +114,30 @@ def _stated(number: int, values: Floats, stated: dict[tuple[float, ...], StatedO
     return STATED + stated[same].index
 
 
-def _offset_events(given: BlockWords) -> list[tuple[int, int | None, Floats | None]]:
+def _offset_events(words: BlockWords) -> list[tuple[int, int | None, Floats | None]]:
     """Blocks that write an offset, its number or None for all, and its X, Y, Z [m] and angle [rad], NaN where they
     stay; None where they are not known."""
-    base, fanuc = given.modal.force[Group.OFFSET], given.control.increments
+    base, fanuc = words.modal.force[Group.OFFSET], words.control.increments
     events: list[tuple[int, int | None, Floats | None]] = []
-    settings = np.flatnonzero(given.modal.has(Once.SETTING))
+    settings = np.flatnonzero(words.modal.has(Once.SETTING))
     if len(settings):
-        level, which = given.number(key("L")), given.number(key("P"))
-        values = np.stack([*(given.lengths(one) for one in AXES[:3]), given.number(key("R")) * DEG], axis=1)
+        level, which = words.number(key("L")), words.number(key("P"))
+        values = np.stack([*(words.lengths(one) for one in AXES[:3]), words.number(key("R")) * DEG], axis=1)
         read = (
-            (given.modal.flow.reason == FlowReason.NONE)
-            & ~given.has(*AXES[3:])
-            & ~given.unclear
-            & ~given.twice
+            (words.modal.flow.reason == FlowReason.NONE)
+            & ~words.has(*AXES[3:])
+            & ~words.unclear
+            & ~words.twice
         )
         if fanuc:  # in G91 the values are added
-            read &= (given.modal.force[Group.DISTANCE] == 0) & ~given.has(key("R"))
-        present = np.stack([given.has(one) for one in (*AXES[:3], key("R"))], axis=1)
+            read &= (words.modal.force[Group.DISTANCE] == 0) & ~words.has(key("R"))
+        present = np.stack([words.has(one) for one in (*AXES[:3], key("R"))], axis=1)
         read &= ~(present & np.isnan(values)).any(axis=1)
         # An angle that no block states is that of the cell: none.
         turned = present[settings, 3].any()
         angle = np.where(present[:, 3] | fanuc | (not turned), np.nan_to_num(values[:, 3]), np.nan)
         values = np.concatenate([values[:, :3], angle[:, None]], axis=1)
-        has = given.has(key("L"))
+        has = words.has(key("L"))
         for block in settings.tolist():
             kind, number = level[block], which[block]
             if kind not in (2, 20):
@@ -156,24 +156,24 @@ def _offset_events(given: BlockWords) -> list[tuple[int, int | None, Floats | No
                 number, kind = 100 + number, 2
             chosen = int(number) or int(base[block])
             events.append((block, chosen, values[block] if kind == 2 and read[block] else None))
-    for note in given.source.notes:
+    for note in words.source.notes:
         assigned = note.kind == "assign" and _is_offset(note.text)
         if assigned or (note.kind == "unknown" and note.text.startswith("#")):
             events.append((note.block, None, None))
-    events += [(block, number, None) for block, number in _rewritten(given, "base", _WRITTEN_BASE, base)]
+    events += [(block, number, None) for block, number in _rewritten(words, "base", _WRITTEN_BASE, base)]
     return sorted(events, key=lambda event: event[0])
 
 
 def _rewritten(
-    given: BlockWords, kind: str, pattern: re.Pattern[str], used: Ints
+    words: BlockWords, kind: str, pattern: re.Pattern[str], used: Ints
 ) -> Iterator[tuple[int, int | None]]:
     """Blocks whose notes of a kind write a base or tool that a motion before them has, and its number, None for any:
     the cell can state only what it is before or after; used (B,): numbers that blocks have; pattern: of
     notes that count, its group is the number."""
-    notes = [note for note in given.source.notes if note.kind == kind]
+    notes = [note for note in words.source.notes if note.kind == kind]
     if not notes:
         return
-    moving = np.flatnonzero(given.motion)
+    moving = np.flatnonzero(words.motion)
     numbers, first = np.unique(used[moving], return_index=True)
     begins = dict(zip(numbers.tolist(), moving[first].tolist(), strict=True))
     for note in notes:
@@ -196,24 +196,24 @@ def _is_offset(assignment: str) -> bool:
     return target[1].isdigit() and any(low <= int(target[1][:9]) <= high for low, high in SYSTEM)
 
 
-def tools(given: BlockWords, loaded: int | None = None) -> tuple[Ints, bool]:
+def tools(words: BlockWords, loaded: int | None = None) -> tuple[Ints, bool]:
     """(B,) number of the tool in force, -1 where it cannot be determined; whether the program names any.
 
     T loads a tool at once, or with M6 in programs that have an M6.  T0 without M6 loads nothing.  A program without a
     tool, or with T0 alone, works with number 1.  ``loaded``: the tool at the start of the program, if that is stated.
     """
     first = -1 if loaded is None else loaded
-    n, column, m = len(given), given.words(key("T")), given.words(key("M"))
+    n, column, m = len(words), words.words(key("T")), words.words(key("M"))
     changes = m.block[m.value == TOOL_CHANGE]
-    tape, sure = given.modal.flow.tape, given.modal.flow.reason == FlowReason.NONE
+    tape, sure = words.modal.flow.tape, words.modal.flow.reason == FlowReason.NONE
     changes = changes[tape[changes]]
-    stated = _stated_tools(given)
+    stated = _stated_tools(words)
     # The last T of a block counts.
     counts = np.append(column.block[1:] != column.block[:-1], True)[: len(column)] & tape[column.block]
     named = np.flatnonzero(counts & ((column.value != 0) | (len(changes) > 0)))
     if not (column.value[named] != 0).any() and not len(stated[0]):
         alone = everywhere(1 if loaded is None else loaded, n, np.int32)
-        return _without_rewritten(given, alone), loaded is not None
+        return _without_rewritten(words, alone), loaded is not None
     block, number = column.block[named], column.value[named]
     whole = (number > 0) & (number == np.floor(number)) & sure[block] & (number < 1e9)
     loads = block, np.where(whole, number, -1).astype(np.int32)
@@ -222,29 +222,29 @@ def tools(given: BlockWords, loaded: int | None = None) -> tuple[Ints, bool]:
         loads = changes, np.where(sure[changes], chosen[changes], -1)
     at, which = (np.concatenate(pair) for pair in zip(loads, stated, strict=True))
     order = np.argsort(at, kind="stable")
-    return _without_rewritten(given, fill_modal(n, at[order], which[order], first, np.int32)), True
+    return _without_rewritten(words, fill_modal(n, at[order], which[order], first, np.int32)), True
 
 
-def _stated_tools(given: BlockWords) -> tuple[Ints, Ints]:
+def _stated_tools(words: BlockWords) -> tuple[Ints, Ints]:
     """Blocks (K,) that say which tool is loaded, without loading it (M61 Q2), and its numbers (K,), -1 if unknown."""
-    code, m = given.control.states_tool, given.words(key("M"))
+    code, m = words.control.states_tool, words.words(key("M"))
     at = m.block[m.value == code] if code is not None else np.empty(0, np.int64)
     if not len(at):
         return at, np.empty(0, np.int32)
-    flow, number = given.modal.flow, given.number(key("Q"))[at]
+    flow, number = words.modal.flow, words.number(key("Q"))[at]
     whole = (
         (number > 0) & (number == np.floor(number)) & (number < 1e9) & (flow.reason[at] == FlowReason.NONE)
     )
     return at[flow.tape[at]], np.where(whole, number, -1).astype(np.int32)[flow.tape[at]]
 
 
-def _without_rewritten(given: BlockWords, tool: Ints) -> Ints:
+def _without_rewritten(words: BlockWords, tool: Ints) -> Ints:
     """(B,) the numbers of tools, -1 from where the program writes other lengths of a tool that it has used."""
     lost: dict[int | None, int] = {}
-    for block, number in _rewritten(given, "tool data", _WRITTEN_TOOL, tool):
+    for block, number in _rewritten(words, "tool data", _WRITTEN_TOOL, tool):
         lost.setdefault(number, block)
-    moving = np.flatnonzero(given.motion)
-    for block, number in written_lengths(given):
+    moving = np.flatnonzero(words.motion)
+    for block, number in written_lengths(words):
         used = moving[tool[moving] == number]
         if len(used) and used[0] < block:
             lost[number] = min(block, lost.get(number, block))
@@ -255,9 +255,9 @@ def _without_rewritten(given: BlockWords, tool: Ints) -> Ints:
     return np.where(np.arange(len(tool)) < until[which], tool, np.int32(-1))
 
 
-def written_lengths(given: BlockWords) -> Iterator[tuple[int, int]]:
+def written_lengths(words: BlockWords) -> Iterator[tuple[int, int]]:
     """Blocks that write a variable of a Fanuc that is the length of a tool or its wear, and the tool's number."""
-    for note in given.source.notes if given.control.increments else ():
+    for note in words.source.notes if words.control.increments else ():
         target = _TARGET.match(note.text) if note.kind == "assign" else None
         if target is None or not (target[1] or "").isdigit():
             continue
@@ -274,48 +274,48 @@ class ToolLengths:
     off: Bools
 
 
-def tool_lengths(given: BlockWords, tool: Ints) -> ToolLengths:
+def tool_lengths(words: BlockWords, tool: Ints) -> ToolLengths:
     """Where a program changes the length of its tool: G43 with another number H or another ``tool`` (B,), or after a
     G10 that writes lengths; G49, a word D of a control with such offsets, M6."""
-    n, force = len(given), given.modal.force[Group.LENGTH]
-    changes, off = switched(force, given.modal.ahead[Group.LENGTH]).copy(), force == 0
+    n, force = len(words), words.modal.force[Group.LENGTH]
+    changes, off = switched(force, words.modal.ahead[Group.LENGTH]).copy(), force == 0
     if (force == 1).any():
-        codes = given.words(key("G"))
+        codes = words.words(key("G"))
         stated = np.zeros(n, np.bool_)
         stated[codes.block[np.isin(codes.value, LENGTH_CODES)]] = True
-        stated |= given.has(key("H"))
+        stated |= words.has(key("H"))
         at = np.flatnonzero(stated & (force == 1))
-        number = given.number(key("H"))[at]
+        number = words.number(key("H"))[at]
         number = np.where(np.isnan(number), tool[at], number)
         # Stated again in the other unit, LinuxCNC moves the coordinates by the length in both.
-        units = given.modal.force[Group.UNITS][at]
+        units = words.modal.force[Group.UNITS][at]
         changes[at[1:][(number[1:] != number[:-1]) | (units[1:] != units[:-1])]] = True
         written = np.flatnonzero(
-            given.modal.has(Once.SETTING) & ~np.isin(given.number(key("L")), OFFSET_LEVELS)
+            words.modal.has(Once.SETTING) & ~np.isin(words.number(key("L")), OFFSET_LEVELS)
         )
         if len(written):
             changes[at[at > written[0]]] = True
             # Fanuc takes a new length at once, LinuxCNC with the next G43
-            changes[written] |= given.control.increments
+            changes[written] |= words.control.increments
         off &= np.maximum.accumulate(force == 1)
-        if given.control.increments:  # length number 0 is none
-            h = given.words(key("H"))
-            own = ~given.modal.has(Once.CALL, Once.SETTING)[h.block]
+        if words.control.increments:  # length number 0 is none
+            h = words.words(key("H"))
+            own = ~words.modal.has(Once.CALL, Once.SETTING)[h.block]
             numbers = np.nan_to_num(h.value[own], nan=-1.0).clip(-1, 1e9).astype(np.int32)
             none = fill_modal(n, h.block[own], numbers, -1, np.int32) == 0
             off = off | (none & (force == 1))
             changes |= switched(none.astype(np.int8), 0)
     else:
         off = everywhere(False, n)
-    m = given.words(key("M"))
+    m = words.words(key("M"))
     changes[m.block[m.value == TOOL_CHANGE]] = True
     changes |= switched(tool, int(tool[0]) if n else -1)
-    if given.control.offsets is not None:
-        edge = given.words(given.control.offsets)
+    if words.control.offsets is not None:
+        edge = words.words(words.control.offsets)
         chosen = fill_modal(n, edge.block, np.nan_to_num(edge.value, nan=-1.0).astype(np.int32), 1, np.int32)
         changes |= switched(chosen, 1)
         changes[edge.block[np.isnan(edge.value)]] = True
-        named = given.words(key("T"))
+        named = words.words(key("T"))
         none = fill_modal(n, named.block, (named.value == 0).astype(np.int8), 0, np.int8)
         off = off | (chosen == 0) | (none == 1)
     return ToolLengths(changes, off)

@@ -26,7 +26,7 @@ class OrientationWords(Protocol):
 
     words: their keys, -1 for one that is not used.  joint: the words are one whole: a block that writes one of them
     states all (those it leaves out are zero).  angles: the numbers are degrees, 360 of which are a turn.
-    free_axis (3,): unit vector in tool axes about which the words say nothing of the turn; NaN where they say all.
+    redundant_axis (3,): unit vector in tool axes about which the words say nothing of the turn; NaN where they say all.
     """
 
     @property
@@ -36,7 +36,7 @@ class OrientationWords(Protocol):
     @property
     def angles(self) -> bool: ...
     @property
-    def free_axis(self) -> Floats: ...
+    def redundant_axis(self) -> Floats: ...
 
     def rotation(self, values: Floats) -> Floats:
         """(n, 3, 3) orientation of the tool in the base, of values (n, 3); NaN where it is not known."""
@@ -74,7 +74,7 @@ class Vector:
     angles: bool = False
 
     @property
-    def free_axis(self) -> Floats:
+    def redundant_axis(self) -> Floats:
         """(3,): see ``OrientationWords``."""
         return np.full(3, np.nan) if self.start is None else self.start.T @ UP
 
@@ -120,7 +120,7 @@ class Angles:
     angles: bool = True
 
     @property
-    def free_axis(self) -> Floats:
+    def redundant_axis(self) -> Floats:
         """(3,): see ``OrientationWords``."""
         return self.tool.T @ UP if self.free_spin and self.tool is not None else np.full(3, np.nan)
 
@@ -173,7 +173,7 @@ class Angles:
         missed = np.ones(len(found), dtype=bool)
         last = np.full(len(found), np.inf)
         for _ in range(_ROUNDS):
-            left, axes = self._left(found[rows], target[rows], pointing)
+            left, axes = self._remaining_turn(found[rows], target[rows], pointing)
             size = np.linalg.norm(left, axis=1)
             far = size > _SOLVED
             missed[rows[~far]] = False
@@ -190,7 +190,7 @@ class Angles:
         found[missed] = np.nan
         return np.asarray(found)
 
-    def _left(self, values: Floats, target: Floats, pointing: bool) -> tuple[Floats, Floats]:
+    def _remaining_turn(self, values: Floats, target: Floats, pointing: bool) -> tuple[Floats, Floats]:
         """The rotation vector (n, 3) from the values to the target, and the axes (n, 3, k) that count for it."""
         rotation, axes = self._turned(values)
         if not pointing:

@@ -97,13 +97,13 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     computed = np.isin(rows, execution.folded.step[folded_codes])
     unbound = bind_names(execution)
 
-    def followed(given: BlockWords) -> FollowedMotions:
+    def followed(words: BlockWords) -> FollowedMotions:
         collector = RefusalCollector(len(rows))
         for file in joined.files:
             message = f"the motion is in {file.path.name}, which is read and not written"
             collector.refuse(joined.of_file(file, offsets_in_text[rows]), "GCO033", message)
         collector.refuse(computed, "GCO005", "a G or M code of the block is computed")
-        return _followed(given, rows, offset, base, tool, settings, unbound, collector)
+        return _followed(words, rows, offset, base, tool, settings, unbound, collector)
 
     run, coordinates = followed(given), False
     if run.differing_radii and control.iso and given.modal.ahead[Group.ARCS] == 0:
@@ -128,16 +128,16 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     refused = collector.done(document, line, start, lines.first[rows])
     frame_of_base, frame_of_tool, cell_frames = references(base, tool[rows], line, offset.stated)
     said = remarks(document, source, rows, execution.order is None, foreign)
-    state = {name: found.taken(name) for name in STATE}
+    state = {name: found.take_column(name) for name in STATE}
     timed = state["feed_mode"] == Feed.INVERSE_TIME
-    drilled = found.taken("drills")
+    drilled = found.take_column("drills")
     path = Toolpath(
         kind=built.kind,
-        position=found.taken("place"),
-        rotation=found.taken("rotation"),
+        position=found.take_column("place"),
+        rotation=found.take_column("rotation"),
         axes=everywhere(np.full(6, np.nan), len(rows)),
-        feed=found.taken("feed"),
-        spindle=shared(found.taken("spindle")),
+        feed=found.take_column("feed"),
+        spindle=shared(found.take_column("spindle")),
         base=frame_of_base,
         tool=frame_of_tool,
         line=line,
@@ -150,18 +150,18 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
                 **no_insert_before(given, rows, foreign),
                 **beside_holes(drilled),
             },
-            orientation_programmed=found.taken("orientation_programmed"),
+            orientation_programmed=found.take_column("orientation_programmed"),
             exact_stays=True,
             ptp_may_change_configuration=False,
         ),
         annotations=said.annotations,
-        arcs=Arcs(*(found.taken(name) for name in ("centre", "normal", "sweep", "plane_free"))),
-        approximation=with_stops(found.taken("blend"), given, rows),
+        arcs=Arcs(*(found.take_column(name) for name in ("centre", "normal", "sweep", "plane_free"))),
+        approximation=with_stops(found.take_column("blend"), given, rows),
         comments=said.comments,
         inverse_time_feed=timed if timed.any() else everywhere(False, len(rows)),
         orientation_control=OrientationControl(
-            path=found.taken("orientation_path"),
-            **{name: found.taken(name) for name in ("rotary_from", "rotary_to", "redundant_axis")},
+            path=found.take_column("orientation_path"),
+            **{name: found.take_column(name) for name in ("rotary_from", "rotary_to", "redundant_axis")},
         ),
         external=external,
         drills=drilled,
@@ -240,7 +240,7 @@ class FollowedMotions(NamedTuple):
 
 
 def _followed(
-    given: BlockWords,
+    words: BlockWords,
     rows: Ints,
     offset: WorkOffsets,
     base: Ints,
@@ -251,23 +251,23 @@ def _followed(
 ) -> FollowedMotions:
     """The motions in the blocks ``rows`` (N,), part by part; base (N,), tool (B,): numbers."""
     turned = None if settings.orientation is None else rotation_from_abc(settings.orientation)
-    events = _events(given)
-    trace = Trace(offsets.start(), events, _change(given, events), _start(settings))
+    events = _events(words)
+    trace = Trace(offsets.start(), events, _change(words, events), _start(settings))
     feeds, tool_orientations, away, reasons = (
-        Feeds(given),
-        ToolOrientations(given, turned),
-        tilted(given),
-        Reasons(len(given)),
+        Feeds(words),
+        ToolOrientations(words, turned),
+        tilted(words),
+        Reasons(len(words)),
     )
-    allowed = blend_tolerances(given)
-    lengths = tool_lengths(given, tool)
-    ends = cycle_ends(given, events, lengths.changes | offset.changed)
-    drills = drill_cycles(given, events, offset.changed, lengths.changes)
+    allowed = blend_tolerances(words)
+    lengths = tool_lengths(words, tool)
+    ends = cycle_ends(words, events, lengths.changes | offset.changed)
+    drills = drill_cycles(words, events, offset.changed, lengths.changes)
     found, differing = FilledRows(len(rows)), 0
-    for start in range(0, max(len(given), 1), PART):
-        stop = min(start + PART, len(given))
+    for start in range(0, max(len(words), 1), PART):
+        stop = min(start + PART, len(words))
         low, high = np.searchsorted(rows, [start, stop]).tolist()
-        here, own = given.part(start, stop), rows[low:high] - start
+        here, own = words.part(start, stop), rows[low:high] - start
         way = frame_events(
             here,
             offset.changed[start:stop],
@@ -291,7 +291,7 @@ def _followed(
             sets=stated_coordinates(ends.stated(way.sets[own, :3], rows[low:high]), moves, holes),
             lost=way.unknown[own, :3],
         )
-    built = Built(rows, *(found.taken(name) for name in ("kind", "sets", "lost", "turned")))
+    built = Built(rows, *(found.take_column(name) for name in ("kind", "sets", "lost", "turned")))
     frames = Poses(
         np.array([frame.turn for frame in trace.frames]),
         np.array([frame.shift[:3] for frame in trace.frames]),
@@ -303,38 +303,38 @@ def _followed(
 
 
 def _columns(
-    given: BlockWords, where: Positions, moves: GcodeMotions, feeds: Feeds
+    words: BlockWords, where: Positions, moves: GcodeMotions, feeds: Feeds
 ) -> dict[str, NDArray[Any]]:
     """What is kept of the motions of a part."""
-    rows, force, stand = moves.block, given.modal.force, moves.tool_orientation
+    rows, force, stand = moves.block, words.modal.force, moves.tool_orientation
     place = moves.place.copy()
-    place[(given.modal.flow.reason[rows] != 0) | np.isnan(place).any(axis=1)] = np.nan
+    place[(words.modal.flow.reason[rows] != 0) | np.isnan(place).any(axis=1)] = np.nan
     placed = ~np.isnan(place[:, :1])
-    feed = feeds.of(rows + given.start, moves.length)
+    feed = feeds.of(rows + words.start, moves.length)
     rotary_from, rotary_to = stand.rotary
     return {
         "kind": moves.kind,
         "place": place,
         "rotation": stand.rotation,
-        "spindle": np.where(given.modal.flow.reason[rows] != 0, np.nan, feeds.speeds(rows + given.start)),
+        "spindle": np.where(words.modal.flow.reason[rows] != 0, np.nan, feeds.speeds(rows + words.start)),
         "feed": np.where(moves.kind == Kind.PTP, np.nan, feed),
         "centre": np.where(placed, moves.centre, np.nan),
         "normal": np.where(placed, moves.normal, np.nan),
         "sweep": np.where(placed[:, 0], moves.arcs.sweep, np.nan),
         # controls accept no rotary words in a drill cycle
         "orientation_programmed": stand.oriented & np.isnan(moves.room),
-        "redundant_axis": stand.free_axis,
+        "redundant_axis": stand.redundant_axis,
         "orientation_path": stand.path,
         "rotary_from": rotary_from,
         "rotary_to": rotary_to,
-        "plane_free": given_by_point(given, rows),
+        "plane_free": given_by_point(words, rows),
         "turned": stand.stated | (stand.orient < 0),
         "move": moves.move,
         "plane": force[Group.PLANE][rows],
         "incremental": force[Group.DISTANCE][rows] == 1,
         "arc_absolute": force[Group.ARCS][rows] == 1,
-        "scale": given.length[rows],
-        "increment": given.length_of_integer[rows],
+        "scale": words.length[rows],
+        "increment": words.length_of_integer[rows],
         "frame": where.frame[rows],
         "start_position": moves.start[:, :3],
         "drills": np.isfinite(moves.room),
@@ -346,29 +346,31 @@ def _columns(
     }
 
 
-def _events(given: BlockWords) -> Ints:
+def _events(words: BlockWords) -> Ints:
     """Blocks that change the frame: G92 and G52 only with coordinates."""
-    mentioned = given.has(*(key(letter) for letter in "XYZABC"))
-    always = given.modal.has(Once.UNSHIFT, Once.SUSPEND, Once.RESTORE, Once.FRAME)
+    mentioned = words.has(*(key(letter) for letter in "XYZABC"))
+    always = words.modal.has(Once.UNSHIFT, Once.SUSPEND, Once.RESTORE, Once.FRAME)
     return np.flatnonzero(
-        (always | (given.modal.has(Once.SHIFT, Once.LOCAL) & mentioned)) & given.modal.flow.tape
+        (always | (words.modal.has(Once.SHIFT, Once.LOCAL) & mentioned)) & words.modal.flow.tape
     )
 
 
-def _change(given: BlockWords, events: Ints) -> Callable[[int, ProgrammedFrame, Floats], ProgrammedFrame]:
+def _change(
+    block_words: BlockWords, events: Ints
+) -> Callable[[int, ProgrammedFrame, Floats], ProgrammedFrame]:
     """The frame after a block that changes it; unknown where the block may not run."""
-    change = given.control.frame
+    change = block_words.control.frame
     notes: dict[int, list[Note]] = {block: [] for block in events.tolist()}
-    for note in given.source.notes if notes else ():
+    for note in block_words.source.notes if notes else ():
         if note.block in notes:
             notes[note.block].append(note)
 
-    keys = [one for one in given.columns if one in given.source.columns]
+    keys = [one for one in block_words.columns if one in block_words.source.columns]
 
     def changed(block: int, frame: ProgrammedFrame, position: Floats) -> ProgrammedFrame:
-        here = given.part(block, block + 1)
+        here = block_words.part(block, block + 1)
         lengths = float(here.length_of_integer[0] / here.length[0])
-        angles = SMALL_ANGLE if given.integers.increments else 1.0
+        angles = SMALL_ANGLE if block_words.integers.increments else 1.0
         small = {one: angles if one in AXES[3:] else lengths for one in keys}
         words = {
             one: float(column.value[-1] * (small[one] if column.how[-1] == How.INTEGER else 1.0))
@@ -398,7 +400,7 @@ def _change(given: BlockWords, events: Ints) -> Callable[[int, ProgrammedFrame, 
 
 
 def _motions(
-    given: BlockWords,
+    words: BlockWords,
     where: Positions,
     trace: Trace,
     rows: Ints,
@@ -406,16 +408,16 @@ def _motions(
     holes: DrillCycles,
 ) -> GcodeMotions:
     start, end = where.start[rows], where.end[rows]
-    force, move = given.modal.force, given.move[rows]
+    force, move = words.modal.force, words.move[rows]
     plane = force[Group.PLANE][rows]
-    is_arc = np.isin(move, (Move.CLOCKWISE, Move.COUNTER, Move.THROUGH)) & ~given.machine[rows]
-    desired_path = arcs_of_blocks(given, rows, start, end, plane, is_arc)
+    is_arc = np.isin(move, (Move.CLOCKWISE, Move.COUNTER, Move.THROUGH)) & ~words.machine[rows]
+    desired_path = arcs_of_blocks(words, rows, start, end, plane, is_arc)
     kind = KINDS[move]
-    kind[given.modal.has(Once.HOME)[rows]] = Kind.PTP
-    kind[given.modal.has(Once.PROBE)[rows]] = Kind.LIN
+    kind[words.modal.has(Once.HOME)[rows]] = Kind.PTP
+    kind[words.modal.has(Once.PROBE)[rows]] = Kind.LIN
     kind[force[Group.AXIAL][rows] != 0] = Kind.PTP
-    kind[given.modal.unknown[rows]] = Kind.OTHER
-    pose = tool_orientations.of(trace, where, rows, given.start, kind == Kind.PTP)
+    kind[words.modal.unknown[rows]] = Kind.OTHER
+    pose = tool_orientations.of(trace, where, rows, words.start, kind == Kind.PTP)
     moves = GcodeMotions.of(rows, move, kind, plane, start, end, where, desired_path, pose)
     return with_holes(moves, holes, where)
 

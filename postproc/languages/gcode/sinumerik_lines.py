@@ -127,8 +127,8 @@ class _Taken:
             self.note("unknown", self.text[head.end() if head else 0 :].strip())
         return LexedLine(self.words, self.notes, self.deleted)
 
-    def note(self, kind: str, said: bytes) -> None:
-        self.notes.append((kind, said.decode("latin-1")))
+    def note(self, kind: str, text: bytes) -> None:
+        self.notes.append((kind, text.decode("latin-1")))
 
     def word(self, at: int, address: int, start: int, stop: int, value: float, how: int) -> None:
         self.words.append((at, address, start, stop, value, how))

@@ -13,7 +13,7 @@ from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.geometry import Poses
 from postproc.languages.gcode.control import Control, Group, Move
 from postproc.languages.gcode.lexing import lex
-from postproc.languages.gcode.modal import said
+from postproc.languages.gcode.modal import decode_g_codes
 from postproc.languages.gcode.orientation_words import OrientationWords
 from postproc.languages.gcode.words import COLUMNS, BlockSpans, How, Text, WordArrays, key
 
@@ -184,7 +184,7 @@ class SourceMapPart(WriterState):
 def _verbs(text: Text, control: Control) -> Ints:
     """(B,) the word that states the motion of a block, the last of them; -1 where none does."""
     rows = np.flatnonzero(text.words.key == key("G"))
-    _, _, groups, values = said(text.words.value[rows], control)
+    _, _, groups, values = decode_g_codes(text.words.value[rows], control)
     rows = rows[(groups == Group.MOTION) & (values != Move.NOTHING)]
     verb = np.full(len(text.blocks), -1, np.int32)
     verb[text.words.block[rows]] = rows

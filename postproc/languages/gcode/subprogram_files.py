@@ -80,7 +80,7 @@ class JoinedText:
             else len(self.source.blocks)
         )
 
-    def foreign(self, start: Ints) -> Bools:
+    def in_other_file(self, start: Ints) -> Bools:
         """(B,) blocks, by where they ``start`` (B,), that are in another file."""
         return np.asarray(start >= self.own) if self.files else np.zeros(len(start), np.bool_)
 
@@ -94,14 +94,14 @@ class JoinedText:
     def at_the_calls(self, source: Source) -> tuple[Source, Bools]:
         """A run with the blocks of other files at the places of the calls; which blocks (B,) these are."""
         lines = source.blocks
-        foreign = self.foreign(lines.start)
-        if not foreign.any():
-            return source, foreign
-        at = np.maximum(np.maximum.accumulate(np.where(foreign, -1, np.arange(len(foreign)))), 0)
+        in_other_file = self.in_other_file(lines.start)
+        if not in_other_file.any():
+            return source, in_other_file
+        at = np.maximum(np.maximum.accumulate(np.where(in_other_file, -1, np.arange(len(in_other_file)))), 0)
         lines = replace(
             lines, start=lines.start[at], stop=lines.stop[at], first=lines.first[at], line=lines.line[at]
         )
-        return Source(source.columns, lines, source.notes, source.comments), foreign
+        return Source(source.columns, lines, source.notes, source.comments), in_other_file
 
 
 def join(raw: bytes, files: Sequence[Document], control: Control) -> JoinedText:

@@ -38,14 +38,14 @@ _SEQUENCES = {EULER: ((2, 0), (0, 1), (2, 2)), RPY: ((2, 2), (1, 1), (0, 0))}
 
 @dataclass(frozen=True, eq=False)
 class ToolOrientation:
-    """rotation (N, 3, 3); oriented (N,): the words can be written; free_axis (N, 3): redundant axis; wrong (N,):
+    """rotation (N, 3, 3); oriented (N,): the words can be written; redundant_axis (N, 3): redundant axis; wrong (N,):
     0, or 1 rotary axes away from 0 or not known without a TCP mode, 2 not known in one.  orient (N,) row in
     ``ToolOrientations.orientations``, -1 where none is in force; values, before (N, 3): as in Places.  stated (N,):
     the block itself states the whole orientation in force.  path (N,) OrientationPath."""
 
     rotation: Floats
     oriented: Bools
-    free_axis: Floats
+    redundant_axis: Floats
     wrong: Ints
     orient: Ints
     values: Floats
@@ -86,15 +86,15 @@ class ToolOrientation:
 class ToolOrientations:
     """The orientation of the motions of a program, which come block by block."""
 
-    def __init__(self, given: BlockWords, turned: Floats | None) -> None:
+    def __init__(self, words: BlockWords, turned: Floats | None) -> None:
         """given: the whole program; turned (3, 3): the tool in the base at A = B = C = 0; None where none is said."""
-        self._given, self._turned = given, turned
-        self._tcp = given.modal.force[Group.TCP] == 1
-        self._used = np.array([len(given.words(one)) > 0 for one in _ROTARY_KEYS])
-        others = (*given.control.vector, *given.control.euler)
-        self._none = not self._used.any() and not any(len(given.words(one)) for one in others)
+        self._given, self._turned = words, turned
+        self._tcp = words.modal.force[Group.TCP] == 1
+        self._used = np.array([len(words.words(one)) > 0 for one in _ROTARY_KEYS])
+        others = (*words.control.vector, *words.control.euler)
+        self._none = not self._used.any() and not any(len(words.words(one)) for one in others)
         if not self._none:
-            self._kind, self._stating = _kinds(given, self._tcp, bool(self._used.any()))
+            self._kind, self._stating = _kinds(words, self._tcp, bool(self._used.any()))
         self.orientations: list[OrientationWords] = []
         self._number: dict[tuple[int, int], int] = {}
 
@@ -140,7 +140,7 @@ class ToolOrientations:
             pair = one == ROTARY and int(self._used.sum()) == 2 and self._turned is not None
             result.oriented[good] = (pair | orientation.writable(values[known])) & ~shifted[known]
             result.path[good] = self._path(one)
-            result.free_axis[good] = orientation.free_axis
+            result.redundant_axis[good] = orientation.redundant_axis
         return result
 
     def _path(self, kind: int) -> OrientationPath:
@@ -184,26 +184,26 @@ class ToolOrientations:
         return np.asarray(values)
 
 
-def _kinds(given: BlockWords, tcp: Bools, rotary: bool) -> tuple[Ints, Ints]:
+def _kinds(words: BlockWords, tcp: Bools, rotary: bool) -> tuple[Ints, Ints]:
     """(B,) what states the orientation in force, _NOWHERE where nothing known does; the block that states it."""
-    n = len(given)
-    control = given.control
+    n = len(words)
+    control = words.control
     stated = np.full(n, _NOWHERE, np.int8)
     marks = np.zeros(n, np.bool_)
-    euler = given.modal.force[Group.EULER]
+    euler = words.modal.force[Group.EULER]
     for keys, kind in (
         (control.euler, np.where(euler == 1, RPY, EULER)),
         (control.vector, np.full(n, VECTOR)),
     ):
         if keys:
-            has = given.has(*keys)
+            has = words.has(*keys)
             stated[has], marks[has] = kind[has], True
             stated[has & (euler < 0) & (kind != VECTOR)] = _NOWHERE
     if rotary:
-        has = given.has(*_ROTARY_KEYS)
+        has = words.has(*_ROTARY_KEYS)
         stated[has], marks[has] = ROTARY, True
-    uncertain = given.modal.flow.reason != 0
-    lost = (marks & uncertain) | given.modal.flow.forget
+    uncertain = words.modal.flow.reason != 0
+    lost = (marks & uncertain) | words.modal.flow.forget
     changed = np.concatenate([[False], tcp[1:] != tcp[:-1]]) if n else marks
     # A vector does not outlast its mode; positions of rotary axes do.
     stated[lost] = _NOWHERE
@@ -227,9 +227,9 @@ def _machine(
 
 
 def _orientation(
-    given: BlockWords, kind: int, turn: Floats, turned: Floats | None, used: Bools
+    block_words: BlockWords, kind: int, turn: Floats, turned: Floats | None, used: Bools
 ) -> OrientationWords:
-    control = given.control
+    control = block_words.control
     if kind == VECTOR:
         return Vector((control.vector[0], control.vector[1], control.vector[2]), turn, turned)
     if kind in _SEQUENCES:

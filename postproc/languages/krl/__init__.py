@@ -35,19 +35,23 @@ class KrlDialect:
     name = "krl"
     family = "KRL"
     letters = b"ABCDEFGHIJKLMNOPQRSTUVWXYZ"  # points have names
+    companion_suffixes: tuple[str, ...] = (".dat",)
 
     def claims(self, path: Path, raw: bytes) -> bool:
         return path.suffix.lower() == ".src" or _CLAIM.search(raw) is not None
 
     def companions(self, path: Path) -> list[Path]:
-        wanted = (path.stem.lower(), ".dat")
+        wanted = {(path.stem.lower(), suffix) for suffix in self.companion_suffixes}
         try:
             beside = list_folder(path.parent)
         except FileNotFoundError:
             return []
-        matches = [p for p in beside if (p.stem.lower(), p.suffix.lower()) == wanted and p.is_file()]
+        matches = [p for p in beside if (p.stem.lower(), p.suffix.lower()) in wanted and p.is_file()]
         # Where several differ by case only, the one spelt as the program is.
         return sorted(matches, key=lambda p: p.stem != path.stem)[:1]
+
+    def main_file(self, companion: Path) -> Path:
+        return companion.with_suffix(".src")
 
     def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
         from postproc.languages.krl import interpreter  # takes its time to load

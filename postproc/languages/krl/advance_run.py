@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from postproc.base.arrays import Bools
 from postproc.languages.core.waits import Waits
-from postproc.languages.krl.lexing import Assignment, Call, Statement, identifiers, kept
+from postproc.languages.krl.lexing import Assignment, Call, Statement, cached, identifiers
 from postproc.languages.krl.modal_state import NAN
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.predecessors import expanded
@@ -79,7 +79,7 @@ def _read_of_system(code: bytes) -> Waits:
     return max((_name(name, lambda _: b"") for name in names), default=Waits.NO)
 
 
-@kept
+@cached
 def _names(code: bytes) -> frozenset[bytes]:
     return identifiers(code) - _WORDS
 

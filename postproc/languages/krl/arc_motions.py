@@ -47,15 +47,15 @@ def move_on_arc(
         enter_motion(run, statement, Kind.CIRC, operand, reason, blend)
         return
     end_point = operand_at(run, code, statement.at, points[0])
-    begin_known = state.point if state.point_frames == (state.base, state.tool) else None
+    start_known = state.point if state.point_frames == (state.base, state.tool) else None
     relative = statement.word.endswith(b"_REL")
     if relative:
         end_point, reason = absolute_target(run, statement, parts, end_point, reason)
-        if isinstance(first.target, KrlTarget) and begin_known is not None:
-            by = shift(begin_known, first.target, relative_reference(statement, parts).in_tool)
-            x, y, z = (old + new for old, new in zip(begin_known, by, strict=False))
+        if isinstance(first.target, KrlTarget) and start_known is not None:
+            by = shift(start_known, first.target, relative_reference(statement, parts).in_tool)
+            x, y, z = (old + new for old, new in zip(start_known, by, strict=False))
             first = first._replace(target=first.target._replace(values=(x, y, z, None, None, None)))
-    found, unknown = _arc_path(state, begin_known, first.target, end_point.target, angle)
+    found, unknown = _arc_path(state, start_known, first.target, end_point.target, angle)
     if found is None and reason is None and isinstance(end_point.target, KrlTarget):
         reason = unknown
     if has_angle and (angle is None or found is None):

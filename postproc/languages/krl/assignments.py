@@ -52,32 +52,32 @@ DEFAULT_ROUNDING = 3.0
 """[mm] $APO.CDIS after BAS(#INITMOV,0): DEF_APO_CDIS of KUKA's bas.src."""
 
 
-def assign(run: ExecutionContext, statement: Statement, said: Assignment, here: bool = False) -> None:
+def assign(run: ExecutionContext, statement: Statement, assignment: Assignment, here: bool = False) -> None:
     """Takes up ``name[index].path = value``; ``here``: it holds for this motion only."""
-    state = run.state
-    if READS_POSITION.search(said.value):
+    state, name = run.state, assignment.name
+    if READS_POSITION.search(assignment.value):
         run.rows.reads.append((statement.line, state.sources))
-    name = said.name
     if name in (b"$BASE", b"$TOOL"):
-        _set_frame(run, statement, name, _assigned_frame(run, name, said, statement.line), here)
+        _set_frame(run, statement, name, _assigned_frame(run, name, assignment, statement.line), here)
     elif name == b"$VEL":
-        if said.path in (b"", b"CP"):
-            _set_speed(run, said)
+        if assignment.path in (b"", b"CP"):
+            _set_speed(run, assignment)
     elif name == b"$APO":
-        if said.path in (b"", b"CDIS"):
-            _set_rounding(run, said)
+        if assignment.path in (b"", b"CDIS"):
+            _set_rounding(run, assignment)
     elif name in OVERRIDES:
-        state.overridden = state.overridden - {name} | ({name} if run.value(said.value) != 100 else set())
+        reduced = {name} if run.value(assignment.value) != 100 else set()
+        state.overridden = state.overridden - {name} | reduced
     elif name == b"$IPO_MODE":
-        mode = said.value.strip().upper()
+        mode = assignment.value.strip().upper()
         if found := _MODE.match(mode):
             mode = (_of_record(run, found[1]) or b"?").upper()
         state.tool_known = not mode.endswith(b"#BASE")
     elif name == b"$ORI_TYPE":
-        value = _turning(run, said, b"ORI_TYP")
+        value = _turning(run, assignment, b"ORI_TYP")
         state.orientation = _ORIENTATIONS.get(value, OrientationMode.UNKNOWN)
     elif name == b"$CIRC_TYPE":
-        value = _turning(run, said, b"CIRC_TYP")
+        value = _turning(run, assignment, b"CIRC_TYP")
         state.arc_frame = _ARC_FRAMES.get(value, ArcFrame.UNKNOWN)
     elif name == b"$CIRC_MODE":
         state.arc_frame = ArcFrame.UNKNOWN
@@ -86,18 +86,18 @@ def assign(run: ExecutionContext, statement: Statement, said: Assignment, here: 
         run.root_set = run.root_set or statement.line
     elif name in (b"$EX_AX_IGNORE", b"$ASYNC_AXIS"):
         before = state.external_apart
-        off = number(said.value.strip()) == 0.0
+        off = number(assignment.value.strip()) == 0.0
         state.external_apart = before - {name} if off else before | {name}
         if before or state.external_apart:
             state.external = apart(state.external)
     elif name == b"FDAT_ACT":
-        state.frames_record = _record(run, said, state.frames_record)
+        state.frames_record = _record(run, assignment, state.frames_record)
     elif name == b"LDAT_ACT":
-        state.path_record = _record(run, said, state.path_record)
+        state.path_record = _record(run, assignment, state.path_record)
     elif name == b"PDAT_ACT":
-        state.axis_record = _record(run, said, state.axis_record)
+        state.axis_record = _record(run, assignment, state.axis_record)
     elif not name.startswith(b"$"):
-        _set_variable(run, said)
+        _set_variable(run, assignment)
 
 
 def with_clause(run: ExecutionContext, statement: Statement, clause: bytes) -> RowRefusal | None:
@@ -166,10 +166,10 @@ def command(run: ExecutionContext, statement: Statement, arguments: bytes) -> No
         state.feed = _number(run, state.path_record, b"VEL") if speed <= 0 else speed
 
 
-def _turning(run: ExecutionContext, said: Assignment, key: bytes) -> bytes:
+def _turning(run: ExecutionContext, assignment: Assignment, key: bytes) -> bytes:
     """What $ORI_TYPE or $CIRC_TYPE is set to, in capitals; of SORI_TYP(LCPDAT1) what that record says under ``key``."""
-    value = said.value.strip()
-    if said.path or said.element is not None:
+    value = assignment.value.strip()
+    if assignment.path or assignment.element is not None:
         return b""
     if found := _ORIENTATION.match(value):
         value = _of_record(run, found[1].strip() + b"." + key) or b""
@@ -196,27 +196,27 @@ def _number(run: ExecutionContext, record: Record | None, key: bytes) -> float:
     return float(value) if is_number(value) else NAN
 
 
-def _set_speed(run: ExecutionContext, said: Assignment) -> None:
-    state, value = run.state, said.value.strip()
+def _set_speed(run: ExecutionContext, assignment: Assignment) -> None:
+    state, value = run.state, assignment.value.strip()
     if found := _SPEED.match(value):
         speed = run.value(found[1].strip()) if found[1].strip() else 0
         state.feed = float(speed) if is_number(speed) else NAN
         if state.feed <= 0:
             state.feed = _number(run, run.record(found[2].strip().upper()), b"VEL")
         return
-    text = value if said.path else fields(value).get(b"CP", b"")
+    text = value if assignment.path else fields(value).get(b"CP", b"")
     # An aggregate without CP leaves it as it was.
-    if said.path or text:
+    if assignment.path or text:
         speed = run.value(text)
         state.feed = float(speed) if is_number(speed) else NAN
 
 
-def _set_rounding(run: ExecutionContext, said: Assignment) -> None:
-    state, value = run.state, said.value.strip()
+def _set_rounding(run: ExecutionContext, assignment: Assignment) -> None:
+    state, value = run.state, assignment.value.strip()
     if found := _ROUNDING.match(value):
         state.blend = _number(run, run.record(found[1].strip().upper()), b"APO_DIST")
         return
-    if said.path:
+    if assignment.path:
         state.blend = _number(run, {b"CDIS": value}, b"CDIS")
     elif b"CDIS" in (given := fields(value)) or not value.startswith(b"{"):
         state.blend = _number(run, given, b"CDIS")
@@ -242,23 +242,23 @@ def _set_frame(
 
 
 def _assigned_frame(
-    run: ExecutionContext, name: bytes, said: Assignment, line: int
+    run: ExecutionContext, name: bytes, assignment: Assignment, line: int
 ) -> FrameIndex | UnknownValue:
-    value = said.value.strip()
-    if said.path or said.element is not None:
+    value = assignment.value.strip()
+    if assignment.path or assignment.element is not None:
         before = run.frames.values(run.state.base if name == b"$BASE" else run.state.tool)
         changed = run.value(value)
         if (
             before is None
             or not is_number(changed)
-            or said.path not in COMPONENTS
-            or said.element is not None
+            or assignment.path not in COMPONENTS
+            or assignment.element is not None
         ):
             return UnknownValue(
-                "KRL012", f"{shown(said.path)} is relative to a frame that is not given in numbers"
+                "KRL012", f"{shown(assignment.path)} is relative to a frame that is not given in numbers"
             )
         values = list(before)
-        values[COMPONENTS[said.path]] = float(changed)
+        values[COMPONENTS[assignment.path]] = float(changed)
         x, y, z, a, b, c = values
         return run.frames.known(None, (x, y, z, a, b, c), line)
     if value.upper() in (b"$WORLD", b"$NULLFRAME"):
@@ -279,7 +279,7 @@ def _assigned_frame(
         return run.frames.known(copied.number, None, line)
     if _EXTERNAL.search(value):
         return UnknownValue("KRL011", f"$BASE is moved by an external kinematic since line {line}")
-    target = _value(run, said.value.rstrip(), said.at)
+    target = _value(run, assignment.value.rstrip(), assignment.at)
     numbers = target.numbers if isinstance(target, KrlTarget) else None
     if numbers is not None:
         return run.frames.known(None, numbers, line)
@@ -298,11 +298,11 @@ def numbered_frame(run: ExecutionContext, table: bytes, at: int, line: int) -> F
     if at == 0:
         return run.frames.known(0, ZERO, line)
     entry = b"[%d]" % at
-    if table + b"_DATA" in run.survey.later:
+    if table + b"_DATA" in run.structure.later:
         name = f"{table.decode()}_DATA"
         return UnknownValue("KRL012", f"{name} is changed by an interrupt or a trigger")
     value = run.variables.get(table + b"_DATA", entry)
-    if value is None and not run.survey.table_entries.isdisjoint((table + b"_DATA" + entry, None)):
+    if value is None and not run.structure.table_entries.isdisjoint((table + b"_DATA" + entry, None)):
         name = f"{table.decode()}_DATA[{at}]"
         return UnknownValue(
             "KRL012", f"{name} has the value of the last run: the program assigns it elsewhere"
@@ -332,22 +332,22 @@ def _copied_entry(run: ExecutionContext, text: bytes) -> Value | None:
     return FrameEntry("KRL002", f"its value is {name}, whose numbers no program states", table, number)
 
 
-def _record(run: ExecutionContext, said: Assignment, before: Record | None) -> Record | None:
+def _record(run: ExecutionContext, assignment: Assignment, before: Record | None) -> Record | None:
     """FDAT_ACT, LDAT_ACT or PDAT_ACT after an assignment; None if not known."""
-    value = said.value.strip()
-    if said.path:
-        return None if before is None else {**before, said.path: value}
+    value = assignment.value.strip()
+    if assignment.path:
+        return None if before is None else {**before, assignment.path: value}
     if value.startswith(b"{"):
         return fields(value)
     name = value.upper()
-    return None if name in run.survey.assigned else run.record(name)
+    return None if name in run.structure.assigned else run.record(name)
 
 
 def _of_record(run: ExecutionContext, text: bytes) -> bytes | None:
     """The entry that ``FP1.BASE_NO`` names."""
     name, _, key = text.strip().upper().partition(b".")
     record = run.record(name)
-    if record is None or name in run.survey.assigned or name + b"." + key in run.survey.assigned:
+    if record is None or name in run.structure.assigned or name + b"." + key in run.structure.assigned:
         return None
     return record.get(key)
 
@@ -366,32 +366,32 @@ def _apply_record(run: ExecutionContext, statement: Statement) -> None:
         state.tool_known = record[b"IPO_FRAME"].upper() != b"#BASE"
 
 
-def _set_variable(run: ExecutionContext, said: Assignment) -> None:
-    name, path = said.name, b""
-    if said.element is not None:
-        indices = index_text(said.element, run.lookup)
+def _set_variable(run: ExecutionContext, assignment: Assignment) -> None:
+    name, path = assignment.name, b""
+    if assignment.element is not None:
+        indices = index_text(assignment.element, run.lookup)
         if indices is None:
             run.forget({name}, "after an assignment with a computed index")
             return
         path = b"[" + indices + b"]"
-    if not said.path:
-        value = _value(run, said.value.rstrip(), said.at)
+    if not assignment.path:
+        value = _value(run, assignment.value.rstrip(), assignment.at)
         if isinstance(value, KrlTarget) and value.missing and run.variables.get(name, path) is not None:
             missing = value.missing
             value = UnknownValue("KRL002", f"the aggregate assigned to {shown(name)} omits {missing}")
         keep(run, name, path, value)
         return
-    inner, _, key = said.path.rpartition(b".")
-    if b"[" in said.path:
+    inner, _, key = assignment.path.rpartition(b".")
+    if b"[" in assignment.path:
         run.forget({name}, "after an assignment with a computed index")
         return
     path += b"." + inner if inner else b""
     is_component = key in COMPONENTS or key in AXES or key in EXTERNAL or key in (b"S", b"T")
     before = run.variables.get(name, path)
     if not is_component or not (isinstance(before, KrlTarget) or _may_be_point(run, name, path)):
-        keep(run, name, path + b"." + key, _value(run, said.value.rstrip(), said.at))
+        keep(run, name, path + b"." + key, _value(run, assignment.value.rstrip(), assignment.at))
         return
-    text = said.value.rstrip()
+    text = assignment.value.rstrip()
     value = run.value(text)
     why = UnknownValue("KRL002", f"its component {shown(key)} is computed")
     if not isinstance(before, KrlTarget):
@@ -406,7 +406,7 @@ def _set_variable(run: ExecutionContext, said: Assignment) -> None:
         before = (
             KrlTarget((None,) * 6, axes=six, unknown=unset) if key in AXES else KrlTarget(six, unknown=unset)
         )
-    place = (0, said.at, said.at + len(text)) if number(text) is not None else (-1, -1, -1)
+    place = (0, assignment.at, assignment.at + len(text)) if number(text) is not None else (-1, -1, -1)
     after = before.changed(key, float(value) if is_number(value) else None, why, place, text)
     run.variables.set(name, path, after)
 

@@ -9,7 +9,7 @@ from postproc.languages.krl.assignments import with_clause
 from postproc.languages.krl.execution_context import Flow, SplineBlock
 from postproc.languages.krl.expressions import Value
 from postproc.languages.krl.flow_frames import BlockFrame
-from postproc.languages.krl.lexing import NAME, SPLINES, Statement, identifiers, is_integer, kept, value_end
+from postproc.languages.krl.lexing import NAME, SPLINES, Statement, cached, identifiers, is_integer, value_end
 from postproc.languages.krl.modal_state import ELSEWHERE
 from postproc.languages.krl.open_blocks import BUDGET, OpenBlocks
 from postproc.languages.krl.program_blocks import Block
@@ -28,7 +28,7 @@ _THEN = re.compile(rb"(?<![A-Za-z0-9_$])THEN[ \t]*\Z", re.I)
 _WITH = re.compile(rb"(?<![A-Za-z0-9_$])WITH(?![A-Za-z0-9_$])(.*)\Z", re.I | re.S)
 
 
-@kept
+@cached
 def _head_of_for(code: bytes) -> tuple[bytes, tuple[bytes, ...], tuple[Value, ...]] | None:
     """Counter of a FOR, the texts of first value, last value and step, and their values where they are digits."""
     found = _FOR.match(code)

@@ -72,10 +72,10 @@ class Calls(BlockFlow):
         if waiting is not None:
             active.waiting = active.waiting.set(name, None)
         self._continue_with(flow)
-        if run.survey.jumps.get(key, (-1, -1))[1] > pc:
+        if run.structure.jumps.get(key, (-1, -1))[1] > pc:
             head = LabelHead(flow, flow, self._checkpoint(copies=True), run.rows.new_mark())
             active.heads = active.heads.set(name, head)
-            self._begin_at(head)
+            self._start_at(head)
 
     def _lose_all(self, item: Statement, name: bytes, key: tuple[int, bytes]) -> None:
         """After a label to which jumps lead that are not followed."""
@@ -89,7 +89,7 @@ class Calls(BlockFlow):
             "KRL024", f"the jumps to {shown(name)} are not followed: from here on nothing is known", item
         )
 
-    def _begin_at(self, head: LabelHead) -> None:
+    def _start_at(self, head: LabelHead) -> None:
         """Goes on after a label with what holds there."""
         sources = self.run.rows.sources
         sources[head.mark] = set() if head.entry is None else set(head.entry.state.sources)
@@ -149,7 +149,7 @@ class Calls(BlockFlow):
         self._return_to(head.checkpoint)
         head = LabelHead(raised, head.entry, head.checkpoint, head.mark)
         self.activations[-1].heads = self.activations[-1].heads.set(name, head)
-        self._begin_at(head)
+        self._start_at(head)
         return routine.labels[name][0] + 1
 
     def _is_single(self, frames: list[BlockFrame]) -> bool:
@@ -186,7 +186,7 @@ class Calls(BlockFlow):
         if not active.blocks and self.reachable and run.state.stop:
             run.rows.stopped_at_end.append((len(run.rows), run.state.sources, run.state.stop))
         if run.walked and not active.blocks and self.reachable:
-            run.rows.left_from |= run.state.sources
+            run.rows.unfollowed_ends |= run.state.sources
         if kind == "return" and not self._is_single(own):
             loop = next((f for f in own if f.followed and f.block.word in LOOPS - {b"FOR"}), None)
             if loop is not None:
@@ -233,38 +233,38 @@ class Calls(BlockFlow):
             run.rows.sources[mark].update(range(first, len(run.rows)))
         run.state.sources = frozenset([mark])
 
-    def _call(self, pc: int, item: Statement, said: Call) -> int:
+    def _call(self, pc: int, item: Statement, call: Call) -> int:
         run = self.run
-        if said.name == b"BAS":
-            command(run, item, said.arguments)
+        if call.name == b"BAS":
+            command(run, item, call.arguments)
             return pc + 1
-        routine = run.survey.routines.get(said.name)
-        if routine is None and said.name in run.others.routines:
-            self._call_other(item, said)
+        routine = run.structure.routines.get(call.name)
+        if routine is None and call.name in run.others.routines:
+            self._call_other(item, call)
             return pc + 1
-        if routine is not None and self._follows(said.name, routine) and self._can_return(said, routine):
-            return self._enter_call(pc, said, routine)
-        run.mentioned |= identifiers(said.arguments)
-        self._called(item, said.name, returned_by(said, run.survey.directions))
+        if routine is not None and self._follows(call.name, routine) and self._can_return(call, routine):
+            return self._enter_call(pc, call, routine)
+        run.mentioned |= identifiers(call.arguments)
+        self._called(item, call.name, returned_by(call, run.structure.directions))
         return pc + 1
 
     def _follows(self, name: bytes, routine: Routine) -> bool:
-        """Whether a call is followed: it is no call of a call of a call ..., nor one of a routine by itself that maybe
-        runs."""
+        """Whether a call is followed: its depth is allowed, and it is none of a routine by itself that maybe runs."""
         run, unsure = self.run, self.unsure or self.run.walked
         if self.unfollowed.everything or run.opaque is not None or routine.is_main or routine.is_function:
             return False
-        if routine.start in self.unfollowed.blocks or name in run.survey.later or (unsure and self.shallow):
+        later = name in run.structure.later or (unsure and self.shallow)
+        if later or routine.start in self.unfollowed.blocks:
             return False
         if unsure and any(frame.block is routine for frame in self.stack):
             return False
         return len(self.activations) <= MOST_CALLS
 
-    def _can_return(self, said: Call, routine: Routine) -> bool:
+    def _can_return(self, call: Call, routine: Routine) -> bool:
         """Whether each parameter that comes back is a variable that the subprogram, and the controller, do not know by
         its own name too."""
         run = self.run
-        given = [text.strip() for text in split_values(said.arguments)]
+        given = [text.strip() for text in split_values(call.arguments)]
         names = [
             found[1].upper()
             for (_, comes_back), text in zip(routine.parameters, given, strict=False)
@@ -274,10 +274,10 @@ class Calls(BlockFlow):
             return True
         if len(set(names)) < len(names) or any(name in SYSTEM or name.startswith(b"$") for name in names):
             return False
-        if len(run.survey.routines) > MOST_EFFECTS:
+        if len(run.structure.routines) > MOST_EFFECTS:
             return False  # as long to look through as nobody waits for
-        for name in closure(run.survey, [routine.name]):
-            inner = run.survey.routines[name]
+        for name in closure(run.structure, [routine.name]):
+            inner = run.structure.routines[name]
             first, last = run.code[inner.start], run.code[min(inner.end, len(run.code) - 1)]
             mentioned = self._mentioned(first, last)
             if any(one in mentioned and one not in inner.types for one in names):
@@ -293,9 +293,9 @@ class Calls(BlockFlow):
             self.mentioned_from[start] = identifiers(self.run.document.raw[start:stop])
         return self.mentioned_from[start]
 
-    def _enter_call(self, pc: int, said: Call, routine: Routine) -> int:
+    def _enter_call(self, pc: int, call: Call, routine: Routine) -> int:
         run, variables = self.run, self.run.variables
-        texts = [text.strip() for text in split_values(said.arguments)]
+        texts = [text.strip() for text in split_values(call.arguments)]
         given: dict[bytes, Entry] = {}
         returned = []
         lost = set()
@@ -338,7 +338,7 @@ class Calls(BlockFlow):
         run = self.run
         called = shown(name)
         why = f"after the call of {called} in line {item.line}"
-        routine = run.survey.routines.get(name)
+        routine = run.structure.routines.get(name)
         if not is_harmless(name):
             run.state.stop = max(run.state.stop, Waits.MAYBE)
         if routine is not None:
@@ -351,7 +351,7 @@ class Calls(BlockFlow):
             if run.state.ended_later:
                 self._end_anywhere(set(), why)
             if self._starts_events(name):
-                run.expect_later(run.survey.later_effects, item.line)
+                run.expect_later(run.structure.later_effects, item.line)
             return
         if is_harmless(name):
             return
@@ -373,10 +373,10 @@ class Calls(BlockFlow):
         if self.event_routines is None:
             run = self.run
             self.event_routines = callers(
-                run.survey,
+                run.structure,
                 (
                     one.name
-                    for one in run.survey.routines.values()
+                    for one in run.structure.routines.values()
                     if any(
                         isinstance(item, Statement) and item.word in EVENTS
                         for item in run.code[one.start : one.end + 1]
@@ -385,32 +385,32 @@ class Calls(BlockFlow):
             )
         return name in self.event_routines
 
-    def _call_other(self, item: Statement, said: Call) -> None:
+    def _call_other(self, item: Statement, call: Call) -> None:
         """A routine of another module: what it leaves is worked out, variables are forgotten."""
         run = self.run
-        run.mentioned |= identifiers(said.arguments)
-        given = [run.value(text.strip()) if text.strip() else None for text in split_values(said.arguments)]
+        run.mentioned |= identifiers(call.arguments)
+        given = [run.value(text.strip()) if text.strip() else None for text in split_values(call.arguments)]
         before = run.state.copy()
         run.state.stop = max(run.state.stop, Waits.MAYBE)
-        returned = returned_by(said, run.survey.directions)
-        self._after_other(item, said.name, returned)
+        returned = returned_by(call, run.structure.directions)
+        self._after_other(item, call.name, returned)
         own = {*(run.routine.types if run.routine is not None else ()), *run.declarations.types}
-        if not run.others.stay_apart(said, returned - (own - run.declarations.shared)):
+        if not run.others.stay_apart(call, returned - (own - run.declarations.shared)):
             return
         if run.state.ended_later:
-            why = f"after the call of {shown(said.name)} in line {item.line}"
+            why = f"after the call of {shown(call.name)} in line {item.line}"
             self._end_anywhere(set(), why)
             return
-        left = self._exit_of(said.name, before, tuple(given))
+        left = self._exit_of(call.name, before, tuple(given))
         if left is not None:
-            why = f"after the call of {shown(said.name)} in line {item.line}"
+            why = f"after the call of {shown(call.name)} in line {item.line}"
             take_exit(run.state, before, left, run.frames, why, item.line)
             if left.moves:
                 run.rows.note_call(before.sources)
             run.state.unsettle(run.has_tcp_mode, run.has_turning)
 
     @abstractmethod
-    def _exit_of(self, name: bytes, state: ModalState, given: tuple[Value | None, ...]) -> RoutineExit | None:
+    def _exit_of(self, name: bytes, state: ModalState, args: tuple[Value | None, ...]) -> RoutineExit | None:
         """What a routine of another module leaves, called with what holds here; None where that is not followed."""
 
     def _after_other(self, item: Statement, name: bytes, words: Set[Effect]) -> None:
@@ -431,7 +431,7 @@ class Calls(BlockFlow):
             state.external = apart(state.external)
         if module.has_trigger:
             state.no_insert = TRIGGERED
-        run.expect_later(module.survey.later_effects, item.line)
+        run.expect_later(module.structure.later_effects, item.line)
         for unread in run.others.unread[name]:
             file = module.document.path.name
             message = (

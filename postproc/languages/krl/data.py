@@ -142,32 +142,36 @@ def read_data(result: Declarations, document: Document, file: int) -> None:
 
 
 def _declare(
-    result: Declarations, said: Declared, key: bytes, value: bytes, at: int, line: int, span: Span, foreign: bool
+    result: Declarations, declaration: Declared, key: bytes, value: bytes, at: int, line: int, span: Span, foreign: bool
 ) -> None:  # fmt: skip
     root = _root(key)
-    result.types[root] = said.type
-    if said.is_global or foreign:
+    result.types[root] = declaration.type
+    if declaration.is_global or foreign:
         result.shared.add(root)
     if root in FRAME_TABLES:
         return
-    if said.type in RECORD_TYPES:
+    if declaration.type in RECORD_TYPES:
         if value.startswith(b"{"):
             result.records[key] = fields(value)
-    elif said.type in POINT_TYPES:
+    elif declaration.type in POINT_TYPES:
         if value:
             point = read_point(value, at, span.file, line)
-            if isinstance(point, KrlTarget) and (said.is_global or foreign):
+            if isinstance(point, KrlTarget) and (declaration.is_global or foreign):
                 point = point._replace(locked="it is GLOBAL, other programs may use it")
             _add(result, key, point, span, foreign)
     elif value.startswith(b"{") and identifiers(value):
         _members(result, root, key[len(root) :], value, line)
-    elif value and said.type in SCALARS and (said.is_constant or _keeps_number(root, said, foreign)):
+    elif (
+        value
+        and declaration.type in SCALARS
+        and (declaration.is_constant or _keeps_number(root, declaration, foreign))
+    ):
         _add(result, key, _constant(value), span, foreign)
 
 
-def _keeps_number(root: bytes, said: Declared, foreign: bool) -> bool:
+def _keeps_number(root: bytes, declaration: Declared, foreign: bool) -> bool:
     """Whether nothing outside of the module assigns a number."""
-    return root.startswith(DEFAULTS) if foreign else not said.is_global
+    return root.startswith(DEFAULTS) if foreign else not declaration.is_global
 
 
 def _members(result: Declarations, root: bytes, path: bytes, value: bytes, line: int, depth: int = 0) -> None:

@@ -107,11 +107,11 @@ class DependentTargets:
         return np.asarray(self.completed.any(axis=1) | self.renewed | (arcs & moves & ~self._refused))
 
 
-def _deviation(said: Components, wanted: Floats, kept: Bools) -> Floats:
+def _deviation(components: Components, wanted: Floats, kept: Bools) -> Floats:
     """(K, 6) what is written less what the program had: zero where its literal stays."""
-    scale = 10.0**said.decimals
+    scale = 10.0**components.decimals
     rounded = np.rint(wanted * scale) / scale
-    return np.where(kept & (said.start >= 0), 0.0, _wrapped(rounded - said.own))
+    return np.where(kept & (components.start >= 0), 0.0, _wrapped(rounded - components.own))
 
 
 def _wrapped(difference: Floats) -> Floats:

@@ -58,7 +58,7 @@ class ExecutionContext:
 
     document: Document
     code: list[Item]
-    survey: ProgramStructure
+    structure: ProgramStructure
     declarations: Declarations
     variables: Variables
     has_tcp_mode: bool
@@ -116,7 +116,7 @@ class ExecutionContext:
 
     def named(self) -> set[bytes]:
         """The names that anything asked for or made unknown: no literal of theirs is changed for one motion alone."""
-        assigned = self.survey.assigned if self.forgot_all else ()
+        assigned = self.structure.assigned if self.forgot_all else ()
         return self.mentioned | {name.partition(b".")[0] for name in assigned}
 
     def forget(self, effects: Effects, why: str) -> None:
@@ -163,7 +163,7 @@ class ExecutionContext:
             if self.type_of(name):
                 return UnknownValue("KRL002", f"{shown(name)} has no value yet")
             return None
-        if name in self.survey.later:
+        if name in self.structure.later:
             return UnknownValue("KRL002", f"{shown(name)} is changed by an interrupt or a trigger")
         return value
 

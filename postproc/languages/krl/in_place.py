@@ -22,15 +22,15 @@ def literal_edits(task: KrlWritePlan, rows: Ints) -> Edits:
     return _edits(task, said, wanted, ~kept)
 
 
-def _edits(task: KrlWritePlan, said: Components, wanted: Floats, chosen: Bools) -> Edits:
+def _edits(task: KrlWritePlan, components: Components, wanted: Floats, chosen: Bools) -> Edits:
     """Edits of the ``chosen`` (K, 6) literals to the ``wanted`` (K, 6) values."""
-    start, stop, file = said.start[chosen], said.stop[chosen], said.file[chosen]
+    start, stop, file = components.start[chosen], components.stop[chosen], components.file[chosen]
     before = np.zeros(len(start), np.uint8)
     for index, raw in enumerate(task.raws):
         here = file == index
         before[here] = raw[start[here] - 1]
     # "Z- 30" is Z and a number, "Z30.1" would be a name.
-    texts, ends = fixed(wanted[chosen], said.decimals[chosen], LETTER[before])
+    texts, ends = fixed(wanted[chosen], components.decimals[chosen], LETTER[before])
     return Edits(file, start, stop, texts, ends)
 
 

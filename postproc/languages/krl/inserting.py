@@ -46,7 +46,7 @@ def insertions(task: KrlWritePlan, among: Ints) -> Iterator[Edits]:
         rows = task.plan.source[block]
         said = task.components(rows)
         wanted = task.wanted(rows, said.own, task.plan.position[block], task.plan.rotation[block])
-        kept = said.kept(wanted)
+        kept = said.unchanged(wanted)
         line = np.searchsorted(source.line_starts, task.places.motion[rows, 0], side="right") - 1
         if task.path.constraints.spline_headers:
             line = task.path.inserted_before[rows] - 1
@@ -65,7 +65,9 @@ def insertions(task: KrlWritePlan, among: Ints) -> Iterator[Edits]:
         yield Edits.joined(single)
 
 
-def _line(task: KrlWritePlan, motion: int, said: Components, wanted: Floats, kept: Bools, k: int) -> bytes:
+def _line(
+    task: KrlWritePlan, motion: int, components: Components, wanted: Floats, kept: Bools, k: int
+) -> bytes:
     """The line of a motion of the plan, in numbers, with the words of its source; a transition move goes straight.
 
     A motion that ``flows`` is approximated as its source is, with C_DIS (in splines C_SPL) where that is not; another
@@ -77,7 +79,7 @@ def _line(task: KrlWritePlan, motion: int, said: Components, wanted: Floats, kep
     found = _WORD.match(raw, at)
     word = found[0] if found else b"LIN"
     relative, arc, variable = places.relative.get(row), places.arcs.get(row), places.variables.get(row)
-    texts = task.texts(said, wanted, kept, k)
+    texts = task.texts(components, wanted, kept, k)
     words = carried(raw[start:stop]) if variable is None else variable.words
     if b"E" in words.upper() and (relative is not None or task.plan.external is not None):
         words = _intermediate_points(
@@ -203,23 +205,24 @@ def _copied(task: KrlWritePlan, block: Ints, rows: Ints, start: Ints) -> Bools:
 
 
 def _copies(
-    task: KrlWritePlan, rows: Ints, said: Components, wanted: Floats, kept: Bools, begin: Ints
+    task: KrlWritePlan, rows: Ints, components: Components, wanted: Floats, kept: Bools, begin: Ints
 ) -> Edits:
     """The lines of segments (K,): the bytes of their source between its literals, and the numbers.
 
     Each line is 15 parts: from its start to the first literal, the first number, ..., to the end of the code, an
     approximation where that has none, newline.
     """
-    order = np.argsort(said.start, axis=1)
+    order = np.argsort(components.start, axis=1)
     start, stop = (
-        np.take_along_axis(part, order, axis=1).astype(np.int64) for part in (said.start, said.stop)
+        np.take_along_axis(part, order, axis=1).astype(np.int64)
+        for part in (components.start, components.stop)
     )
     end = task.places.motion[rows, 3]
     # What stays is taken from the text, what does not from ``texts``.
     new = ~np.take_along_axis(kept, order, axis=1)
     numbers, decimals = (
         np.take_along_axis(wanted, order, axis=1),
-        np.take_along_axis(said.decimals, order, axis=1),
+        np.take_along_axis(components.decimals, order, axis=1),
     )
     low = int(begin.min())
     texts, ends = fixed(numbers[new], decimals[new], LETTER[task.raws[0][start - 1]][new])

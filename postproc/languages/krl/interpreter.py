@@ -160,7 +160,7 @@ def _unresolved(run: ExecutionContext, entries: Mapping[str, FrameRef]) -> froze
     """Names that the program asks for and no file that was read declares; routines with ().  entries: of BASE_DATA and
     TOOL_DATA that motions have."""
     known = {*FRAME_TABLES, *run.declarations.types, *run.declarations.values, *run.declarations.records}
-    known |= {name for routine in run.survey.routine_at.values() for name in routine.types}
+    known |= {name for routine in run.structure.routine_at.values() for name in routine.types}
     names = {name for name in run.variables.asked - known if not name.startswith(b"$")}
     calls = run.unread | {name for of in run.others.unread.values() for name in of}
     unknown = (entry for entry, frame in entries.items() if frame.declared is None)
@@ -227,9 +227,9 @@ def _nothing_followed(surveyed: ProgramStructure) -> Unfollowed:
 
 def _report_structure(run: ExecutionContext) -> None:
     name = str(run.document.path)
-    for line, what in run.survey.unclosed:
+    for line, what in run.structure.unclosed:
         run.findings.append(Finding("KRL014", what, name, line, 1))
-    if not run.survey.has_routine:
+    if not run.structure.has_routine:
         first = next((n for n, a, b in lines(run.document) if run.document.raw[a:b].strip()), 1)
         run.findings.append(Finding("KRL018", "the file has no DEF", name, first, 1))
 
@@ -239,7 +239,7 @@ def _report_forms(run: ExecutionContext) -> None:
     chunks = (chunk for chunk in run.rows.chunks if isinstance(chunk, list))
     rows = {row.line for chunk in chunks for row in chunk if row.kind == Kind.OTHER}
     for item in run.code:
-        if isinstance(item, Statement) and item.code in run.survey.ill_formed and item.line not in rows:
+        if isinstance(item, Statement) and item.code in run.structure.ill_formed and item.line not in rows:
             message = f"'{shown(item.code)}' is not understood; what it does is not known"
             run.add_finding("KRL034", message, item)
 

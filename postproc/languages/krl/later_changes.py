@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from postproc.languages.krl.lexing import NAME, Call, Statement, kept, without_strings
+from postproc.languages.krl.lexing import NAME, Call, Statement, cached, without_strings
 from postproc.languages.krl.statement_effects import called_in, is_harmless
 
 EVENTS = frozenset([b"INTERRUPT", b"TRIGGER", b"GLOBAL"])
@@ -19,7 +19,7 @@ def later_actions(statement: Statement) -> list[Call]:
     return [Call(name.upper(), given) for name, given in _LATER.findall(statement.code)]
 
 
-@kept
+@cached
 def later_functions(code: bytes) -> tuple[bytes, ...]:
     """The functions that the code of an interrupt or a trigger calls, with what it hands over or in its condition; not
     those of KRL itself, nor those that a trigger calls where it stands."""

@@ -131,13 +131,13 @@ class Statement(NamedTuple):
     comment: bytes = b""
 
 
-def kept(function: Callable[[bytes], T]) -> Callable[[bytes], T]:
+def cached(function: Callable[[bytes], T]) -> Callable[[bytes], T]:
     """A function of code that keeps what it gave for short texts: some lines come again and again."""
-    cached = lru_cache(maxsize=1024)(function)
+    remembered = lru_cache(maxsize=1024)(function)
 
     @wraps(function)
     def short_or_long(code: bytes) -> T:
-        return cached(code) if len(code) <= 100 else function(code)
+        return remembered(code) if len(code) <= 100 else function(code)
 
     return short_or_long
 
@@ -159,7 +159,7 @@ def split_comment(line: bytes) -> tuple[bytes, bytes]:
     return (line, b"") if at < 0 else (line[:at], line[at:])
 
 
-@kept
+@cached
 def identifiers(code: bytes) -> frozenset[bytes]:
     """Every name that a piece of code mentions, upper case; enumeration words (#X) and strings are none."""
     return frozenset([name.upper() for name in _IDENTIFIER.findall(without_strings(code))])
@@ -213,7 +213,7 @@ def statement(raw: bytes, line: int, start: int, stop: int) -> Statement | None:
     return Statement(kind, word, code, line, start + at, said, comment)
 
 
-@kept
+@cached
 def _parts_of(line: bytes) -> tuple[str, bytes, bytes, int, Said, bytes] | None:
     """Kind, first word, code, its offset, what it says and the comment of a line that starts at byte 0."""
     code, comment = split_comment(line.rstrip(b"\r\n"))
@@ -232,13 +232,13 @@ def _parts_of(line: bytes) -> tuple[str, bytes, bytes, int, Said, bytes] | None:
     return kind, word, code, at, said, comment
 
 
-def _further_on(said: Said, by: int) -> Said:
+def _further_on(operand: Said, by: int) -> Said:
     """What a statement says that starts so many bytes further on."""
-    if isinstance(said, Assignment):
-        return said._replace(at=said.at + by)
-    if isinstance(said, Declared):
-        return said._replace(items=tuple([(key, value, at + by) for key, value, at in said.items]))
-    return said
+    if isinstance(operand, Assignment):
+        return operand._replace(at=operand.at + by)
+    if isinstance(operand, Declared):
+        return operand._replace(items=tuple([(key, value, at + by) for key, value, at in operand.items]))
+    return operand
 
 
 def has_foreign_letters(code: bytes) -> bool:

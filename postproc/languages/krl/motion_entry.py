@@ -119,12 +119,12 @@ def enter_motion(
         if stated.locked:
             rows.locked[row] = stated.locked
     if kind == Kind.SPL or run.spline is not None:
-        rows.whole[row] = "it is part of a spline"
+        rows.no_insert_before[row] = "it is part of a spline"
         _in_block(run, row)
     elif state.no_insert:
-        rows.whole[row] = state.no_insert
-    elif statement.line in run.survey.inline and not _in_form(run, row):
-        rows.whole[row] = "it is an inline form that sets another base or tool"
+        rows.no_insert_before[row] = state.no_insert
+    elif statement.line in run.structure.inline and not _in_form(run, row):
+        rows.no_insert_before[row] = "it is an inline form that sets another base or tool"
     state.no_insert = ""
     if partial or relative or operand.builds:
         rows.builds_on[row] = state.sources

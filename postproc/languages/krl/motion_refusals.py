@@ -62,9 +62,9 @@ def structure_refusal(run: ExecutionContext) -> RowRefusal | None:
             "KRL023", "the flow that the program's constants define does not lead here", "never"
         )
     if routine is None:
-        if run.survey.has_routine:
+        if run.structure.has_routine:
             return RowRefusal("KRL014", "the motion is outside every DEF", "outside")
-    elif run.walked and routine.name in run.survey.later:
+    elif run.walked and routine.name in run.structure.later:
         message = f"it is in the subprogram of line {routine.line}, which an interrupt or trigger calls"
         return RowRefusal("KRL015", message, f"def {routine.line}")
     if run.opaque is not None:

@@ -55,7 +55,7 @@ class MotionRow(NamedTuple):
 class VectorisedLot(NamedTuple):
     """A run of common lines, and the state in which it is passed; external: E1..E6 of all lines, or of each (K, 6)."""
 
-    bulk: VectorisedLines
+    vectorised: VectorisedLines
     feed: float
     base: int
     tool: int
@@ -74,7 +74,7 @@ class MotionRows:
     row before ends -> where.  ``stopped``: rows before which the advance run stops (2) or may (1);
     ``stopped_at_end``: the same of ends of routines: the count of rows, their sources, and 2 or 1.
     ``calls``: the count of rows, and after which ones a routine of another module moves the robot.
-    ``left_from``: where routines end after which it is not known what runs.
+    ``unfollowed_ends``: where routines end after which it is not known what runs.
     ``never_from``: the first row of those that never run.
     """
 
@@ -88,12 +88,12 @@ class MotionRows:
     locked: dict[int, str] = field(default_factory=dict)
     arcs: dict[int, Auxiliary] = field(default_factory=dict)
     relative: dict[int, Relative] = field(default_factory=dict)
-    whole: dict[int, str] = field(default_factory=dict)
+    no_insert_before: dict[int, str] = field(default_factory=dict)
     sources_of: dict[int, frozenset[Source]] = field(default_factory=dict)
     stopped: dict[int, int] = field(default_factory=dict)
     stopped_at_end: list[tuple[int, frozenset[Source], int]] = field(default_factory=list)
     calls: list[tuple[int, frozenset[Source]]] = field(default_factory=list)
-    left_from: set[Source] = field(default_factory=set)
+    unfollowed_ends: set[Source] = field(default_factory=set)
     never_from: int | None = None
     inline: dict[int, InlineForm] = field(default_factory=dict)
     approximated: dict[int, float] = field(default_factory=dict)
@@ -121,14 +121,16 @@ class MotionRows:
         self.count += 1
         return self.count - 1
 
-    def add_bulk(self, bulk: VectorisedLines, state: ModalState, reason: RowRefusal | None) -> int:
+    def add_vectorised(
+        self, vectorised: VectorisedLines, state: ModalState, reason: RowRefusal | None
+    ) -> int:
         """Adds a run of common lines; gives the number of the last row."""
         first = self.count
-        external = carried_on(state.external, bulk.external, bool(state.external_apart))
+        external = carried_on(state.external, vectorised.external, bool(state.external_apart))
         frames = index(state.base), index(state.tool)
         self.chunks.append(
             VectorisedLot(
-                bulk,
+                vectorised,
                 state.steady_feed,
                 *frames,
                 state.steady_blend,
@@ -137,7 +139,7 @@ class MotionRows:
                 state.arc_frame,
             )
         )
-        self.count += len(bulk)
+        self.count += len(vectorised)
         state.external = external if isinstance(external, tuple) else six(external[-1].tolist())
         if reason is not None:
             self.ranges.append((first, self.count, reason))
@@ -175,7 +177,7 @@ class MotionRows:
         """Takes the rows from ``count`` on out again."""
         while self.count > count:
             chunk = self.chunks[-1]
-            size = len(chunk) if isinstance(chunk, list) else len(chunk.bulk)
+            size = len(chunk) if isinstance(chunk, list) else len(chunk.vectorised)
             if isinstance(chunk, list) and self.count - size < count:
                 del chunk[count - self.count :]  # a copy of what stays would take the time of all of it
                 self.count = count
@@ -183,9 +185,9 @@ class MotionRows:
                 self.chunks.pop()
                 self.count -= size
         for sparse in (
-            self.anchors, self.reasons, self.variables, self.locked, self.arcs, self.relative, self.whole, self.inline,
-            self.approximated, self.arc_blends, self.builds_on, self.passing, self.entries, self.sources_of,
-            self.stopped,
+            self.anchors, self.reasons, self.variables, self.locked, self.arcs, self.relative,
+            self.no_insert_before, self.inline, self.approximated, self.arc_blends, self.builds_on,
+            self.passing, self.entries, self.sources_of, self.stopped,
         ):  # fmt: skip
             while sparse and next(reversed(sparse)) >= count:
                 sparse.popitem()

@@ -43,12 +43,16 @@ class Spots:
         self.text = np.arange(n, dtype=np.int32)
         self._first: dict[int, int] = {}
 
-    def take_bulk(self, part: slice, bulk: VectorisedLines) -> None:
+    def take_bulk(self, part: slice, vectorised: VectorisedLines) -> None:
         """Common lines; where they run again they keep the numbers of their texts."""
-        self.start[part], self.stop[part], self.motion[part] = bulk.start, bulk.stop, bulk.motion
-        self.insert[part] = bulk.stop[:, 5]
-        first = self._first.setdefault(id(bulk), part.start)
-        self.text[part] = np.arange(first, first + len(bulk))
+        self.start[part], self.stop[part], self.motion[part] = (
+            vectorised.start,
+            vectorised.stop,
+            vectorised.motion,
+        )
+        self.insert[part] = vectorised.stop[:, 5]
+        first = self._first.setdefault(id(vectorised), part.start)
+        self.text[part] = np.arange(first, first + len(vectorised))
 
     def take(self, part: slice, rows: list[MotionRow]) -> None:
         """Rows that were read alone."""
@@ -102,21 +106,21 @@ class MotionTable:
                     self._fill(at + first, chunk[first : first + BLOCK])
                 at += len(chunk)
                 continue
-            bulk = chunk.bulk
-            part = slice(at, at + len(bulk))
-            self._place(part, bulk.values)
-            self.kind[part] = np.where(bulk.is_line, Kind.LIN, Kind.PTP)
-            self.line[part] = bulk.line + np.arange(len(bulk))
-            self._state(part, bulk.status, bulk.turn)
+            vectorised = chunk.vectorised
+            part = slice(at, at + len(vectorised))
+            self._place(part, vectorised.values)
+            self.kind[part] = np.where(vectorised.is_line, Kind.LIN, Kind.PTP)
+            self.line[part] = vectorised.line + np.arange(len(vectorised))
+            self._state(part, vectorised.status, vectorised.turn)
             self._external(part, np.array(chunk.external))
             self.base[part], self.tool[part] = chunk.base, chunk.tool
-            self.feed[part] = np.where(bulk.is_line, chunk.feed, NAN)
-            self.blend[part] = np.array([0.0, chunk.blend, NAN])[bulk.approximation]
-            self.word[part] = bulk.motion[:, 0]
+            self.feed[part] = np.where(vectorised.is_line, chunk.feed, NAN)
+            self.blend[part] = np.array([0.0, chunk.blend, NAN])[vectorised.approximation]
+            self.word[part] = vectorised.motion[:, 0]
             self.orientation[part], self.arc_frame[part] = chunk.orientation, chunk.arc_frame
             if self.spots is not None:
-                self.spots.take_bulk(part, bulk)
-            at += len(bulk)
+                self.spots.take_bulk(part, vectorised)
+            at += len(vectorised)
         for row, blend in rows.approximated.items():
             self.blend[row] = blend
 

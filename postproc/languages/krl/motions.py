@@ -51,41 +51,41 @@ def move(run: ExecutionContext, statement: Statement) -> None:
     state.orientation, state.arc_frame = outside.orientation, outside.arc_frame
 
 
-def move_bulk(run: ExecutionContext, bulk: VectorisedLines) -> None:
+def move_bulk(run: ExecutionContext, vectorised: VectorisedLines) -> None:
     """Takes up a run of common lines."""
     state = run.state
     reason = structure_refusal(run) or frames_missing(run)
     run.rows.note_start(state)
     if state.no_insert:
-        run.rows.whole[len(run.rows)] = state.no_insert
+        run.rows.no_insert_before[len(run.rows)] = state.no_insert
         state.no_insert = ""
-    last = run.rows.add_bulk(bulk, state, reason)
+    last = run.rows.add_vectorised(vectorised, state, reason)
     if (turns := orientation_refusal(state, Kind.LIN)) is not None:
-        for row in (last + 1 - len(bulk) + np.flatnonzero(bulk.is_line)).tolist():
+        for row in (last + 1 - len(vectorised) + np.flatnonzero(vectorised.is_line)).tolist():
             run.rows.reasons[row] = reason or turns
     state.point, state.point_frames, state.axes, state.anchor = (
-        _bulk_end(state, bulk),
+        _bulk_end(state, vectorised),
         (state.base, state.tool),
         None,
         None,
     )
-    state.point_line = bulk.line + len(bulk) - 1
+    state.point_line = vectorised.line + len(vectorised) - 1
     state.sources = frozenset([last])
     if state.moved_later:
-        for row in range(last + 2 - len(bulk), last + 1):
+        for row in range(last + 2 - len(vectorised), last + 1):
             run.rows.sources_of[row] = frozenset([row - 1, ELSEWHERE])
         state.unsettle(run.has_tcp_mode, run.has_turning)
 
 
-def _bulk_end(state: ModalState, bulk: VectorisedLines) -> Numbers:
+def _bulk_end(state: ModalState, vectorised: VectorisedLines) -> Numbers:
     """Where a run of common lines ends, X..C."""
-    x, y, z, a, b, c = bulk.values[-1].tolist()
-    if state.orientation not in NOT_TO_TARGET or not bulk.is_line[-1]:
+    x, y, z, a, b, c = vectorised.values[-1].tolist()
+    if state.orientation not in NOT_TO_TARGET or not vectorised.is_line[-1]:
         return x, y, z, a, b, c
     point = state.point if state.point_frames == (state.base, state.tool) else None
-    jumps = np.flatnonzero(~bulk.is_line)
-    start = bulk.values[jumps[-1]] if len(jumps) else np.array(point or NAN6)
-    same = (bulk.values[jumps[-1] + 1 if len(jumps) else 0 :, 3:] == start[3:]).all()
+    jumps = np.flatnonzero(~vectorised.is_line)
+    start = vectorised.values[jumps[-1]] if len(jumps) else np.array(point or NAN6)
+    same = (vectorised.values[jumps[-1] + 1 if len(jumps) else 0 :, 3:] == start[3:]).all()
     return (x, y, z, a, b, c) if same else (x, y, z, NAN, NAN, NAN)
 
 

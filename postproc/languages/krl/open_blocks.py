@@ -49,7 +49,7 @@ class OpenBlocks:
     def _activation(self) -> Activation:
         return Activation(len(self.stack), PersistentMap(self._labels), PersistentMap(self._labels))
 
-    def begin(self) -> None:
+    def reset(self) -> None:
         """Nothing is open."""
         self.stack, self.reachable = [], True
         self.activations = [self._activation()]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.expressions import index_text
-from postproc.languages.krl.lexing import NAME, identifiers, kept
+from postproc.languages.krl.lexing import NAME, cached, identifiers
 from postproc.languages.krl.source_map import PointVariable
 from postproc.languages.krl.statement_effects import HERE, READS_POSITION
 from postproc.languages.krl.target import KrlTarget, UnknownValue, parse, plain, shown
@@ -154,7 +154,7 @@ class _OperandName(NamedTuple):
     rest: bytes
 
 
-@kept
+@cached
 def _take_name(text: bytes) -> _OperandName | None:
     found = _NAMED.match(text)
     if found is None:

@@ -64,7 +64,7 @@ class OtherModule:
 
     document: Document
     code: list[Item]
-    survey: ProgramStructure
+    structure: ProgramStructure
     declarations: Declarations
     apart: bool
 
@@ -72,13 +72,13 @@ class OtherModule:
     def can_be_followed(self) -> bool:
         """Whether its routines end where their text says."""
         words = {one.word for one in self.code if isinstance(one, Statement)}
-        return not self.survey.unclosed and b"RESUME" not in words
+        return not self.structure.unclosed and b"RESUME" not in words
 
     @cached_property
     def shared_later(self) -> set[bytes]:
         """Variables that other modules know, and that its interrupts and triggers change."""
         own = self.declarations.types.keys() - self.declarations.shared
-        return self.survey.later - self.survey.routines.keys() - own
+        return self.structure.later - self.structure.routines.keys() - own
 
     @cached_property
     def has_trigger(self) -> bool:
@@ -117,37 +117,39 @@ class OtherModules:
     outcomes: dict[tuple[bytes, str], RoutineExit | None] = field(default_factory=dict)
     steps: int = 0
 
-    def share(self, survey: ProgramStructure, own: Set[bytes]) -> None:
+    def share(self, structure: ProgramStructure, own: Set[bytes]) -> None:
         """Takes up what the program changes: to the modules, and to it what they change, but for its ``own`` names."""
-        self.assigned |= survey.assigned
-        survey.table_entries |= self.table_entries
-        later = survey.later.union(*(module.shared_later for module, _ in self.routines.values()))
-        survey.later |= later - own
-        self._share_parameters(survey)
+        self.assigned |= structure.assigned
+        structure.table_entries |= self.table_entries
+        later = structure.later.union(*(module.shared_later for module, _ in self.routines.values()))
+        structure.later |= later - own
+        self._share_parameters(structure)
         for module, _ in self.routines.values():
-            module.survey.table_entries |= survey.table_entries
-            for name in module.survey.later & self.effects.keys():
-                module.survey.later_effects |= {one for one in self.effects[name] if isinstance(one, str)}
-            module.survey.later |= later - module.declarations.types.keys() | module.shared_later
+            module.structure.table_entries |= structure.table_entries
+            for name in module.structure.later & self.effects.keys():
+                module.structure.later_effects |= {one for one in self.effects[name] if isinstance(one, str)}
+            module.structure.later |= later - module.declarations.types.keys() | module.shared_later
 
-    def _share_parameters(self, survey: ProgramStructure) -> None:
+    def _share_parameters(self, structure: ProgramStructure) -> None:
         """Takes up what changes later because it is handed over to another module."""
         parameters = parameters_of({name: routine for name, (_, routine) in self.routines.items()})
         for module, routine in self.routines.values():
-            survey.later |= module.survey.later & {name for name, _ in routine.parameters}
-        spread_later(survey, parameters)
+            structure.later |= module.structure.later & {name for name, _ in routine.parameters}
+        spread_later(structure, parameters)
         for module, routine in self.routines.values():
-            module.survey.later |= survey.later & {name for name, _ in routine.parameters}
+            module.structure.later |= structure.later & {name for name, _ in routine.parameters}
         for module in dict.fromkeys(module for module, _ in self.routines.values()):
-            spread_later(module.survey, parameters)
+            spread_later(module.structure, parameters)
 
-    def stay_apart(self, said: Call, returned: Set[Effect]) -> bool:
+    def stay_apart(self, call: Call, returned: Set[Effect]) -> bool:
         """Whether the variables that a call hands over to come back are no two of one name, and none of ``returned``
         is one of the controller, or one that a module may know by its own name."""
-        back = [comes_back for _, comes_back in self.routines[said.name][1].parameters]
-        given = zip(split_values(said.arguments), back, strict=False)
+        back = [comes_back for _, comes_back in self.routines[call.name][1].parameters]
+        given = zip(split_values(call.arguments), back, strict=False)
         names = [name for text, comes_back in given if comes_back and (name := returned_to(text))]
-        surveys = [module.survey for module in dict.fromkeys(module for module, _ in self.routines.values())]
+        surveys = [
+            module.structure for module in dict.fromkeys(module for module, _ in self.routines.values())
+        ]
         return (
             len(set(names)) == len(names)
             and all(isinstance(effect, bytes) for effect in returned)
@@ -171,9 +173,9 @@ def read_modules(
     twice: set[bytes] = set()
     for document in filter(is_module, documents):
         module = _module(document, data.get(_stem(document)), references, symbols)
-        found.assigned |= module.survey.assigned
-        found.table_entries |= module.survey.table_entries
-        for routine in module.survey.routines.values():
+        found.assigned |= module.structure.assigned
+        found.table_entries |= module.structure.table_entries
+        for routine in module.structure.routines.values():
             if routine.is_main or routine.is_global:
                 if routine.name in found.routines:
                     twice.add(routine.name)
@@ -213,7 +215,7 @@ def _module(
     return OtherModule(document, code, program_structure(statements), declarations, apart)
 
 
-def _settle(found: OtherModules, name: bytes) -> None:
+def _settle(modules: OtherModules, name: bytes) -> None:
     """Notes what a routine, and all that it calls, changes and does not find."""
     effects: Effects = set()
     unread: dict[bytes, None] = {}
@@ -224,21 +226,23 @@ def _settle(found: OtherModules, name: bytes) -> None:
         if at in seen:
             continue
         seen.add(at)
-        if at not in found.routines:
+        if at not in modules.routines:
             if not is_harmless(at):
                 unread[at] = None
                 effects.add("point")
             continue
-        module, routine = found.routines[at]
+        module, routine = modules.routines[at]
         own = module.declarations
         effects |= {
             effect
             for effect in routine.effects
             if isinstance(effect, str) or effect not in own.types or effect in own.shared
         }
-        called = {call for one in closure(module.survey, [at]) for call in module.survey.routines[one].calls}
-        todo += sorted(called - module.survey.routines.keys())
-    found.effects[name], found.unread[name] = effects, tuple(unread)
+        called = {
+            call for one in closure(module.structure, [at]) for call in module.structure.routines[one].calls
+        }
+        todo += sorted(called - module.structure.routines.keys())
+    modules.effects[name], modules.unread[name] = effects, tuple(unread)
 
 
 def visible(modules: OtherModules, declarations: Declarations) -> dict[bytes, Effects]:

@@ -77,7 +77,7 @@ def _few(rows: MotionRows, sources: frozenset[Source], many: set[Source]) -> set
 def _sources_of_others(rows: MotionRows, single: Bools) -> Iterable[Source]:
     """Where the motions start that do not simply follow the row before them."""
     others = {source for row, sources in rows.sources_of.items() if not single[row] for source in sources}
-    return others | rows.left_from
+    return others | rows.unfollowed_ends
 
 
 def expanded(rows: MotionRows, sources: Iterable[Source], seen: set[Source] | None = None) -> set[int]:

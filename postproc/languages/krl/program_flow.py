@@ -73,52 +73,52 @@ class ProgramFlow(Calls):
         start = run.flow()
         pc: int | None = 0
         while pc is not None and pc < len(run.code):
-            routine = run.survey.routine_at.get(pc)
+            routine = run.structure.routine_at.get(pc)
             if routine is None:
                 pc = self._step(pc)
                 continue
             if routine.is_main:
                 run.resume(Flow(run.initial, run.variables.facts))
                 run.routine = routine
-                self.begin()
+                self.reset()
                 self._run(routine)
             pc = routine.end + 1
-        walked = closure(run.survey, [*self.text_called, *run.survey.later])
-        for routine in run.survey.routine_at.values():
+        walked = closure(run.structure, [*self.text_called, *run.structure.later])
+        for routine in run.structure.routine_at.values():
             if not routine.is_main and (routine.name not in run.followed or routine.name in walked):
                 run.variables.facts = start.variables
                 self._walk(routine)
         self._idle()
         run.rows.comments = list(self.comments.values())
 
-    def outcome(self, routine: Routine, given: tuple[Value | None, ...]) -> Flow | None:
+    def outcome(self, routine: Routine, args: tuple[Value | None, ...]) -> Flow | None:
         """What holds where a routine of another module returns that is called with these values."""
         run = self.run
         self.mentioned_from, self.event_routines, self.resumes = {}, None, False
         run.resume(Flow(run.initial, run.variables.facts))
         run.routine = routine
-        self.begin()
+        self.reset()
         for i, (name, _) in enumerate(routine.parameters):
-            value = given[i] if i < len(given) else None
+            value = args[i] if i < len(args) else None
             run.variables.replace(name, {} if value is None else {b"": run.converted(name, value)})
         pc: int | None = routine.start + 1
         while pc is not None and pc < len(run.code):
             pc = self._step(pc)
         return run.merged(self.activations[-1].returned, self._here())
 
-    def _exit_of(self, name: bytes, state: ModalState, given: tuple[Value | None, ...]) -> RoutineExit | None:
+    def _exit_of(self, name: bytes, state: ModalState, args: tuple[Value | None, ...]) -> RoutineExit | None:
         run = self.run
         others = run.others
         module, routine = others.routines[name]
         register = FrameRegister()
         entry = state_at_entry(state, run.frames, register)
-        key = name, repr((entry, register.refs(), given))
+        key = name, repr((entry, register.refs(), args))
         if key not in others.outcomes:
             others.outcomes[key] = None  # of a call of itself nothing is known
             few = run.depth < MOST_DEPTH and len(others.outcomes) < MOST_OUTCOMES
             if few and others.steps < MOST_STEPS and module.can_be_followed:
                 inner = replace(
-                    run, document=module.document, code=module.code, survey=module.survey,
+                    run, document=module.document, code=module.code, structure=module.structure,
                     declarations=module.declarations, variables=module.variables(others),
                     effects_of_others=visible(others, module.declarations), rows=MotionRows(module.document),
                     initial=entry, state=ModalState(), frames=register, spline=None, opaque=None, findings=[],
@@ -127,7 +127,7 @@ class ProgramFlow(Calls):
                 )  # fmt: skip
                 following = ProgramFlow(inner, Unfollowed())
                 with contextlib.suppress(Restart):
-                    flow = following.outcome(routine, given)
+                    flow = following.outcome(routine, args)
                     others.outcomes[key] = None if flow is None else exit_of(flow.state, register, inner.rows)
                 others.steps += following.steps + len(module.declarations.types)
         return others.outcomes[key]
@@ -135,11 +135,11 @@ class ProgramFlow(Calls):
     def _run(self, routine: Routine) -> None:
         run = self.run
         pc: int | None = routine.start + 1
-        outside = routine.end + 1 if run.survey.has_routine else len(run.code)
+        outside = routine.end + 1 if run.structure.has_routine else len(run.code)
         while pc is not None and pc < len(run.code) and (pc < outside or run.routine is not routine):
             pc = self._step(pc)
         run.routine, run.state = None, ModalState()
-        self.begin()
+        self.reset()
 
     def _walk(self, routine: Routine) -> None:
         """Goes over a routine of whose callers nothing is known."""
@@ -153,12 +153,12 @@ class ProgramFlow(Calls):
         run.walked = True
         run.forget(EVERYTHING - {"all"}, f"at the start of the subprogram of line {routine.line}")
         run.routine = routine
-        self.begin()
+        self.reset()
         first = len(run.rows)
         self._run(routine)
         run.walked_rows.append((first, len(run.rows), routine))
         if run.ended_later:
-            run.rows.left_from |= set(range(first, len(run.rows)))
+            run.rows.unfollowed_ends |= set(range(first, len(run.rows)))
         run.walked = False
 
     def _idle(self) -> None:
@@ -170,7 +170,7 @@ class ProgramFlow(Calls):
             if isinstance(chunk, list):
                 lines.update(row.line for row in chunk)
             else:
-                bulks.add(id(chunk.bulk))
+                bulks.add(id(chunk.vectorised))
         run.idle, run.rows.never_from = True, len(run.rows)
         for item in run.code:
             if isinstance(item, VectorisedLines):
@@ -180,7 +180,7 @@ class ProgramFlow(Calls):
             elif item.kind == "motion" and item.line not in lines:
                 self._anywhere()
                 motions.move(run, item)
-            elif item.kind == "strange" and item.line not in lines and run.survey.has_routine:
+            elif item.kind == "strange" and item.line not in lines and run.structure.has_routine:
                 self._anywhere()
                 motions.unknown_motion(run, item)
 
@@ -212,12 +212,12 @@ class ProgramFlow(Calls):
             return pc + 1
         if item.comment:
             self._comment(item)
-        if run.walked and run.survey.aliases:
+        if run.walked and run.structure.aliases:
             self._forget_aliases(item)
         kind, said = item.kind, item.strings
         if kind == "comment":
             return pc + 1
-        if kind == "motion" and b"(" not in item.code and pc not in run.survey.events:
+        if kind == "motion" and b"(" not in item.code and pc not in run.structure.events:
             run.variables.line = item.line
             motions.move(run, item)
             return pc + 1
@@ -226,19 +226,19 @@ class ProgramFlow(Calls):
         if not item.code.isascii() and kind != "motion" and has_foreign_letters(item.code):
             self._report_letters(item)
         run.variables.line = item.line
-        if item.code in run.survey.ill_formed:
+        if item.code in run.structure.ill_formed:
             why = f"after line {item.line}, which is not understood"
             run.forget(effects_of_unknown(item.code), why)
         if b"(" in item.code:
             self._call_functions(item)
-        if pc in run.survey.events:
+        if pc in run.structure.events:
             there = self._block_event(pc, item)
             if there is not None or not self.reachable:
                 return pc + 1 if there is None else there
         if kind == "motion":
             motions.move(run, item)
         elif kind == "strange":
-            if run.survey.has_routine:
+            if run.structure.has_routine:
                 motions.unknown_motion(run, item)
             run.forget(effects_of(item)[0], f"after line {item.line}, which is not understood")
         elif kind == "foreign" and isinstance(said, Call):
@@ -265,7 +265,7 @@ class ProgramFlow(Calls):
             run.state.external = by_themselves(run.state.external, item.code)
         elif item.word == b"TIME_BLOCK" and run.spline is not None:
             run.state.feed = NAN  # the block takes a time
-        elif kind == "other" and run.survey.has_routine and HIDDEN.search(item.code):
+        elif kind == "other" and run.structure.has_routine and HIDDEN.search(item.code):
             motions.unknown_motion(run, item)
         elif item.word in EVENTS:
             if item.word == b"TRIGGER":
@@ -276,12 +276,12 @@ class ProgramFlow(Calls):
     def _forget_aliases(self, item: Statement) -> None:
         """In a routine of whose callers nothing is known: what else a statement changes may have been handed over."""
         run = self.run
-        changed = effects_of(item, run.survey.directions)[0]
+        changed = effects_of(item, run.structure.directions)[0]
         if functions_of(item):
             changed = changed | as_effects(identifiers(item.code))
-        same = changed & run.survey.aliases.keys()
+        same = changed & run.structure.aliases.keys()
         if same:
-            others = frozenset[Effect]().union(*(run.survey.aliases[effect] for effect in same)) - changed
+            others = frozenset[Effect]().union(*(run.structure.aliases[effect] for effect in same)) - changed
             run.forget(set(others), f"as it may be what line {item.line} changes")
 
     def _advance_run(self, pc: int, item: Statement) -> None:
@@ -306,7 +306,7 @@ class ProgramFlow(Calls):
 
     def _block_event(self, pc: int, item: Statement) -> int | None:
         """Opens, changes or closes blocks; gives where it goes on if that is not after the statement."""
-        for what, block in self.run.survey.events[pc]:
+        for what, block in self.run.structure.events[pc]:
             if what == "open":
                 return self._open(pc, item, block)
             if what == "branch":
@@ -320,7 +320,7 @@ class ProgramFlow(Calls):
         """A statement to which no path leads: it may be the end of a block, or a label, to which one does."""
         if isinstance(item, VectorisedLines):
             return pc + 1
-        if pc in self.run.survey.events:
+        if pc in self.run.structure.events:
             there = self._block_event(pc, item)
             return pc + 1 if there is None else there
         if item.kind == "label" and isinstance(item.strings, bytes):
@@ -331,7 +331,7 @@ class ProgramFlow(Calls):
 
     def _comment(self, item: Statement) -> None:
         run = self.run
-        if run.survey.inline and item.kind == "comment" and INLINE.match(item.comment):
+        if run.structure.inline and item.kind == "comment" and INLINE.match(item.comment):
             state = run.state
             at = run.document.raw.rfind(b"\n", 0, item.at) + 1
             state.form = InlineFormState(at, (state.base, state.tool), state.feed)
@@ -345,11 +345,11 @@ class ProgramFlow(Calls):
     def _later(self, item: Statement) -> None:
         """Takes up what an interrupt or a trigger may do from here on."""
         run = self.run
-        run.expect_later(run.survey.later_effects, item.line)
+        run.expect_later(run.structure.later_effects, item.line)
         called = called_in(item.code)
         named = [one.name for one in later_actions(item) if one.name in called]
         for name in (*named, *later_functions(item.code)):
-            if name != b"BAS" and name not in run.survey.routines:
+            if name != b"BAS" and name not in run.structure.routines:
                 self._unread(item, name)
 
     def _report_letters(self, item: Statement) -> None:

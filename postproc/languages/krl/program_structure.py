@@ -359,25 +359,25 @@ def program_structure(
     return found
 
 
-def spread_later(found: ProgramStructure, others: Mapping[bytes, Parameters]) -> None:
+def spread_later(structure: ProgramStructure, others: Mapping[bytes, Parameters]) -> None:
     """Takes up what changes later by the parameters of routines; others: those of other modules."""
-    every = spread(found.later, found.handed, {**others, **parameters_of(found.routines)})
-    found.later |= {effect for effect in every if isinstance(effect, bytes)}
-    found.later_effects |= {effect for effect in every if isinstance(effect, str)}
+    every = spread(structure.later, structure.handed, {**others, **parameters_of(structure.routines)})
+    structure.later |= {effect for effect in every if isinstance(effect, bytes)}
+    structure.later_effects |= {effect for effect in every if isinstance(effect, str)}
 
 
-def closure(found: ProgramStructure, names: Iterable[bytes]) -> set[bytes]:
+def closure(structure: ProgramStructure, names: Iterable[bytes]) -> set[bytes]:
     """The routines of the file among ``names``, and all that they call."""
-    return _reached(found.routines, names, lambda name: found.routines[name].calls)
+    return _reached(structure.routines, names, lambda name: structure.routines[name].calls)
 
 
-def callers(found: ProgramStructure, names: Iterable[bytes]) -> set[bytes]:
+def callers(structure: ProgramStructure, names: Iterable[bytes]) -> set[bytes]:
     """The routines of the file among ``names``, and all that call one of them, or call what calls one ..."""
     callers_of: dict[bytes, set[bytes]] = {}
-    for name, routine in found.routines.items():
+    for name, routine in structure.routines.items():
         for call in routine.calls:
             callers_of.setdefault(call, set()).add(name)
-    return _reached(found.routines, names, lambda name: callers_of.get(name, ()))
+    return _reached(structure.routines, names, lambda name: callers_of.get(name, ()))
 
 
 def _reached(
@@ -400,22 +400,22 @@ def _join(into: Effects, more: Iterable[Effect]) -> None:
         into.update(words, ["all"])
 
 
-def _settle(found: ProgramStructure, blocks: Sequence[Block], others: Mapping[bytes, Effects]) -> None:
+def _settle(structure: ProgramStructure, blocks: Sequence[Block], others: Mapping[bytes, Effects]) -> None:
     """Brings what the called routines change into the effects of who calls them."""
-    others = {name: of for name, of in others.items() if name not in found.routines}
-    for name in {name for block in blocks for name in block.calls} | found.later:
-        found.assigned.update(effect for effect in others.get(name, ()) if isinstance(effect, bytes))
-    if len(found.routines) > MOST_EFFECTS:
+    others = {name: of for name, of in others.items() if name not in structure.routines}
+    for name in {name for block in blocks for name in block.calls} | structure.later:
+        structure.assigned.update(effect for effect in others.get(name, ()) if isinstance(effect, bytes))
+    if len(structure.routines) > MOST_EFFECTS:
         for block in blocks:
             if block.calls:
-                _join(block.effects, [*found.effects, "all", "point", *MODAL])
+                _join(block.effects, [*structure.effects, "all", "point", *MODAL])
         return
-    reached = {name: closure(found, [name]) for name in found.routines}
+    reached = {name: closure(structure, [name]) for name in structure.routines}
     strange = {
         name
-        for name, routine in found.routines.items()
+        for name, routine in structure.routines.items()
         if any(
-            call not in found.routines and call not in others and not is_harmless(call)
+            call not in structure.routines and call not in others and not is_harmless(call)
             for call in routine.calls
         )
     }
@@ -423,8 +423,8 @@ def _settle(found: ProgramStructure, blocks: Sequence[Block], others: Mapping[by
     for name, routines in reached.items():
         total[name] = set() if strange.isdisjoint(routines) else {"point"}
         for other in routines:
-            _join(total[name], found.routines[other].effects)
-            for call in found.routines[other].calls & others.keys():
+            _join(total[name], structure.routines[other].effects)
+            for call in structure.routines[other].calls & others.keys():
                 _join(total[name], others[call])
     for block in blocks:
         for name in block.calls:

@@ -45,7 +45,7 @@ class RewrittenLines:
 
     def __init__(self, task: KrlWritePlan) -> None:
         self.task = task
-        self.held: dict[int, Finding] = {}
+        self.refused: dict[int, Finding] = {}
         self._wishes: dict[tuple[int, int], dict[int, tuple[Edit, ...]]] = {}
         self._points: dict[tuple[Span, tuple[bytes, ...]], tuple[bytes, Edit]] = {}
 
@@ -65,7 +65,7 @@ class RewrittenLines:
         """Gives a row a point of its own in the place of ``operand``, with six components; of an auxiliary point
         (``via``) three count.  ``why``: what the old one serves besides."""
         if self.task.writing.shared_points == "keep":
-            self.hold(row, why)
+            self.refuse(row, why)
             return
         raw = self.task.documents[0].raw
         words = carried(raw[operand.start : operand.stop]) if variable is None else variable.words
@@ -87,7 +87,7 @@ class RewrittenLines:
         words = carried(raw[start:stop]) if variable is None else variable.words
         if words or (arc is not None and arc.has_angle):
             why = "it is a relative motion after a corrected one, with CA, S, T or external axes"
-            self.hold(row, why, "KRL008")
+            self.refuse(row, why, "KRL008")
             return
         edits = [
             Edit(word, raw[word.start : word.stop - len(b"_REL")]),
@@ -105,25 +105,25 @@ class RewrittenLines:
         joins = span.start > 0 and LETTER[raw[span.start - 1]] and LETTER[text[0]]
         return Edit(span, b" " + text if joins else text)
 
-    def hold(self, row: int, why: str, code: str = SHARED) -> None:
+    def refuse(self, row: int, why: str, code: str = SHARED) -> None:
         document, at = self.task.documents[0], int(self.task.places.motion[row, 0])
-        self.held[row] = Finding(code, why, str(document.path), *document.place(at), HELP)
+        self.refused[row] = Finding(code, why, str(document.path), *document.place(at), HELP)
 
     def edits(self) -> list[Edit]:
         """What can be written; the other rows are in ``held`` then."""
         result: dict[Edit, None] = {}
         for rows in self._wishes.values():
-            runs = set(self._runs(next(iter(rows))))
+            runs = set(self._rows_of_statement(next(iter(rows))))
             if len(set(rows.values())) > 1 or runs - rows.keys():
                 for row in rows:
-                    self.hold(
+                    self.refuse(
                         row, f"the line runs {len(runs)} times, and the runs need different corrections"
                     )
                 continue
             result.update(dict.fromkeys(next(iter(rows.values()))))
         return list(result)
 
-    def _runs(self, row: int) -> list[int]:
+    def _rows_of_statement(self, row: int) -> list[int]:
         """All rows of the statement of ``row``."""
         words = self.task.places.motion[:, 0]
         return np.flatnonzero(words == words[row]).tolist() if self._repeated else [row]

@@ -68,14 +68,14 @@ def _items(document: Document, fast: bool) -> Iterator[Item]:
     runs = [found.span() for found in _RUN.finditer(raw, place)] if fast else []
     groups = _groups(runs)
     read = in_blocks(
-        lambda part: [_bulk(raw, *run) for group in groups[part] for run in group], len(groups), 1
+        lambda part: [_vectorised_lines(raw, *run) for group in groups[part] for run in group], len(groups), 1
     )
     for (start, stop), found in zip(runs, chain.from_iterable(read), strict=True):
         yield from _lines(raw, line, place, start)
         line += raw.count(b"\n", place, start)
-        bulk = _kept(found, line, store)
-        yield bulk
-        line += len(bulk)
+        vectorised = _compacted(found, line, store)
+        yield vectorised
+        line += len(vectorised)
         place = stop
     yield from _lines(raw, line, place, len(raw))
 
@@ -88,18 +88,18 @@ def _groups(runs: Sequence[tuple[int, int]]) -> list[Sequence[tuple[int, int]]]:
     return [runs[a:b] for a, b in pairwise(bounds) if a < b]
 
 
-def _kept(bulk: VectorisedLines, line: int, store: ArrayStore) -> VectorisedLines:
+def _compacted(vectorised: VectorisedLines, line: int, store: ArrayStore) -> VectorisedLines:
     """The same where it takes no more memory than it needs, with the number of its first line."""
-    external = bulk.external
+    external = vectorised.external
     return replace(
-        bulk,
+        vectorised,
         line=line,
-        is_line=store.keep(bulk.is_line),
-        values=store.keep(bulk.values),
-        start=store.keep(bulk.start),
-        stop=store.keep(bulk.stop),
-        motion=store.keep(bulk.motion),
-        approximation=store.keep(bulk.approximation),
+        is_line=store.keep(vectorised.is_line),
+        values=store.keep(vectorised.values),
+        start=store.keep(vectorised.start),
+        stop=store.keep(vectorised.stop),
+        motion=store.keep(vectorised.motion),
+        approximation=store.keep(vectorised.approximation),
         external=store.keep(external) if external is not None and not is_shared(external) else external,
     )
 
@@ -114,7 +114,7 @@ def _lines(raw: bytes, line: int, start: int, stop: int) -> Iterator[Item]:
         start, line = end, line + 1
 
 
-def _bulk(raw: bytes, start: int, stop: int) -> VectorisedLines:
+def _vectorised_lines(raw: bytes, start: int, stop: int) -> VectorisedLines:
     """The common lines from byte ``start`` to ``stop``, as if they were the first ones."""
     text = np.frombuffer(raw, np.uint8, stop - start, start)
     ends = np.flatnonzero(text == 0x0A)

@@ -17,8 +17,8 @@ from postproc.languages.krl.lexing import (
     Call,
     Declared,
     Statement,
+    cached,
     identifiers,
-    kept,
     keyed,
     split_values,
     without_strings,
@@ -153,7 +153,7 @@ def functions_of(statement: Statement) -> tuple[bytes, ...]:
     return called_in(code)
 
 
-@kept
+@cached
 def called_in(code: bytes) -> tuple[bytes, ...]:
     """The names in an expression behind which a bracket opens, upper case."""
     names = dict.fromkeys(name.upper() for name in _FUNCTION.findall(without_strings(code)))
@@ -211,13 +211,13 @@ def effects_of_unknown(code: bytes) -> Effects:
     return effects | MODAL if b"BAS" in names else effects
 
 
-def returned_by(said: Call, known: Directions) -> frozenset[Effect]:
+def returned_by(call: Call, known: Directions) -> frozenset[Effect]:
     """What a call may change: of what is handed over other than as IN, and is no expression."""
-    if not said.arguments:
+    if not call.arguments:
         return frozenset()
-    comes_back = known.get(said.name, ())
+    comes_back = known.get(call.name, ())
     names = set()
-    for i, text in enumerate(split_values(said.arguments)):
+    for i, text in enumerate(split_values(call.arguments)):
         name = returned_to(text) if i >= len(comes_back) or comes_back[i] else None
         if name is not None:
             names.add(name)
@@ -230,9 +230,9 @@ def returned_to(text: bytes) -> bytes | None:
     return found[1].upper() if found else None
 
 
-def entries_given(said: Call) -> set[bytes | None]:
+def entries_given(call: Call) -> set[bytes | None]:
     """The entries of BASE_DATA and TOOL_DATA that are handed over; None for one whose number is computed."""
-    places = filter(None, map(_ENTRY.match, split_values(said.arguments)))
+    places = filter(None, map(_ENTRY.match, split_values(call.arguments)))
     return {None if found[2] is None else keyed(found[1].upper(), found[2]) for found in places}
 
 

@@ -20,7 +20,7 @@ from postproc.languages.krl.lexing import (
     Declared,
     Statement,
     assignment,
-    kept,
+    cached,
     split_values,
 )
 
@@ -87,7 +87,7 @@ def is_well_formed(statement: Statement) -> bool:
     return statement.word in LOOSE or _has_form(code)
 
 
-@kept
+@cached
 def _has_form(code: bytes) -> bool:
     """Whether a statement that its first word identifies has the form that this word asks for."""
     found = re.match(NAME, code)
@@ -108,7 +108,7 @@ def _has_form(code: bytes) -> bool:
     return not rest and (word in ALONE or word.startswith(b"END") or word == b"ON_ERROR_PROCEED")
 
 
-@kept
+@cached
 def _declares(code: bytes) -> bool:
     head = DECLARED.match(code)
     if head is None or head[3].upper() in _RESERVED:
@@ -148,10 +148,12 @@ def _is_later(code: bytes) -> bool:
     return _assigns(said) if said is not None else is_expression(text)
 
 
-def _assigns(said: Assignment) -> bool:
-    if said.name in _RESERVED:
+def _assigns(assignment: Assignment) -> bool:
+    if assignment.name in _RESERVED:
         return False
-    return is_expression(said.value) and (said.element is None or _all_expressions(said.element))
+    return is_expression(assignment.value) and (
+        assignment.element is None or _all_expressions(assignment.element)
+    )
 
 
 def _all_expressions(text: bytes) -> bool:

@@ -86,7 +86,7 @@ def single_edits(task: KrlWritePlan, rows: Ints, completed: Bools) -> tuple[list
     for number, targets in needed.items():
         edits += _of_one_text(task, targets, users.get(number, {}), lines)
     edits += lines.edits()
-    return edits, lines.held
+    return edits, lines.refused
 
 
 def _targets(task: KrlWritePlan, rows: Ints, completed: Bools, lines: RewrittenLines) -> Iterator[TargetEdit]:
@@ -97,8 +97,8 @@ def _targets(task: KrlWritePlan, rows: Ints, completed: Bools, lines: RewrittenL
     vias, kept_angle = _arc_points(task, rows, wanted)
     finer = np.where(kept_angle[:, None] & (np.arange(6) < 3), FINER, 0)
     said = replace(said, decimals=said.decimals + finer)
-    kept, steps = said.kept(wanted), said.half_step
-    said_vias = _said_vias(task, [row for row in rows.tolist() if row in places.arcs])
+    kept, steps = said.unchanged(wanted), said.half_step
+    programmed_vias = _programmed_vias(task, [row for row in rows.tolist() if row in places.arcs])
     for k, row in enumerate(rows.tolist()):
         texts = task.texts(said, wanted, kept, k)
         arc = places.arcs.get(row)
@@ -122,7 +122,7 @@ def _targets(task: KrlWritePlan, rows: Ints, completed: Bools, lines: RewrittenL
         if arc.angle is not None:
             _change_angle(task, row, arc.angle, bool(kept_angle[k]), lines)
         finer_by = FINER if kept_angle[k] else 0
-        auxiliary = _auxiliary(task, row, arc, said_vias[row], via, finer_by, texts[3:])
+        auxiliary = _auxiliary(task, row, arc, programmed_vias[row], via, finer_by, texts[3:])
         if auxiliary.missing or auxiliary.anew():
             yield auxiliary
 
@@ -158,7 +158,7 @@ def _auxiliary(
     )  # fmt: skip
 
 
-def _said_vias(task: KrlWritePlan, rows: list[int]) -> dict[int, Via]:
+def _programmed_vias(task: KrlWritePlan, rows: list[int]) -> dict[int, Via]:
     """Values [mm] and decimals of the auxiliary points of rows, as the text gives them."""
     arcs = [task.places.arcs[row] for row in rows]
     start, stop, file = (
@@ -200,7 +200,7 @@ def _users(task: KrlWritePlan, needed: dict[int, list[TargetEdit]]) -> dict[int,
                 spot = (int(places.file[row, i]), int(places.start[row, i]))
                 users[int(places.text[row])][spot] = float(said.own[k, i])
     kept = [row for row, arc in places.arcs.items() if arc.text in needed and (row, True) not in moving]
-    for row, (values, _) in _said_vias(task, kept).items():
+    for row, (values, _) in _programmed_vias(task, kept).items():
         arc = places.arcs[row]
         for i in range(3):
             if arc.start[i] >= 0:

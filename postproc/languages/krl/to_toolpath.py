@@ -71,10 +71,10 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
         frames=used,
         constraints=EditConstraints(
             refused=refused,
-            locked=_pinned(rows, table, refused),
-            no_insert_before=_whole(rows, several, continues),
+            locked=_locked(rows, table, refused),
+            no_insert_before=_no_insert_before(rows, several, continues),
             spline_headers=_entries(rows, several),
-            orientation_programmed=_oriented(table),
+            orientation_programmed=_correctable_orientations(table),
             inserted_approximation=_sparse((n,), np.nan, rows.arc_blends, MM),
         ),
         annotations=tuple(rows.annotations),
@@ -98,7 +98,11 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
     return (
         toolpath,
         found,
-        [*_reported(rows, table, refused), *_told_external(rows, table), *_told_stops(rows, table, stopped)],
+        [
+            *_reported(rows, table, refused),
+            *_external_axis_findings(rows, table),
+            *_stop_findings(rows, table, stopped),
+        ],
     )
 
 
@@ -196,7 +200,7 @@ def _refuse_several_starts(rows: MotionRows, table: MotionTable, single: Bools) 
 
 def _lock(run: ExecutionContext) -> None:
     """Literals of variables that other code reads stay as they are."""
-    rows, read = run.rows, run.named() | run.survey.read | run.variables.mixed
+    rows, read = run.rows, run.named() | run.structure.read | run.variables.mixed
     for row, variable in rows.variables.items():
         if variable.name and _root(variable.name) in read:
             rows.locked.setdefault(row, READ_TOO)
@@ -210,16 +214,16 @@ def _root(name: bytes) -> bytes:
     return name.partition(b".")[0].partition(b"[")[0]
 
 
-def _whole(rows: MotionRows, several: Ints, continues: Bools) -> dict[int, str]:
+def _no_insert_before(rows: MotionRows, several: Ints, continues: Bools) -> dict[int, str]:
     """Rows before which nothing can be inserted.  ``several``: rows whose line runs several times; ``continues`` (N,):
     the motion surely starts where the row before ends."""
-    whole = dict(rows.whole)
+    no_insert_before = dict(rows.no_insert_before)
     for row in np.flatnonzero(~continues).tolist():
         if row not in rows.reasons:
-            whole.setdefault(row, OTHER_PATHS)
+            no_insert_before.setdefault(row, OTHER_PATHS)
     for row in several.tolist():
-        whole.setdefault(row, SEVERAL)
-    return dict(sorted(whole.items()))
+        no_insert_before.setdefault(row, SEVERAL)
+    return dict(sorted(no_insert_before.items()))
 
 
 def _several(table: MotionTable) -> Ints:
@@ -237,7 +241,7 @@ def _entries(rows: MotionRows, several: Ints) -> dict[int, int]:
     return {row: line for row, line in rows.entries.items() if row not in again}
 
 
-def _oriented(table: MotionTable) -> Bools:
+def _correctable_orientations(table: MotionTable) -> Bools:
     """(N,) motions whose orientation can be corrected by their text: not those that keep the one with which they start
     ($ORI_TYPE=#CONSTANT), nor the motion before, whose orientation all of them would take over."""
     keep = (table.orientation == OrientationMode.CONSTANT) & np.isin(
@@ -256,7 +260,7 @@ def _stop(table: MotionTable, blends: dict[int, float]) -> dict[int, float]:
     return stated
 
 
-def _told_stops(rows: MotionRows, table: MotionTable, stopped: dict[int, float]) -> list[Finding]:
+def _stop_findings(rows: MotionRows, table: MotionTable, stopped: dict[int, float]) -> list[Finding]:
     """Where the program states approximations at which the controller stops, or may."""
     findings = []
     for verb, found in (
@@ -359,7 +363,7 @@ def _reported(rows: MotionRows, table: MotionTable, refused: dict[int, Finding])
     return findings
 
 
-def _told_external(rows: MotionRows, table: MotionTable) -> list[Finding]:
+def _external_axis_findings(rows: MotionRows, table: MotionTable) -> list[Finding]:
     """What ``check`` says of external axes that do not stay where they are first."""
     first: dict[str, int] = {}
     if not is_shared(table.external):
@@ -377,7 +381,7 @@ def _told_external(rows: MotionRows, table: MotionTable) -> list[Finding]:
     return [_finder(rows, table)(min(first.values()), "KRL022", message)]
 
 
-def _pinned(rows: MotionRows, table: MotionTable, refused: dict[int, Finding]) -> dict[int, Finding]:
+def _locked(rows: MotionRows, table: MotionTable, refused: dict[int, Finding]) -> dict[int, Finding]:
     """Rows that a refused motion builds on, or whose reached position the program reads."""
     pins: dict[int, Finding] = {}
     if not rows.builds_on and not rows.reads:

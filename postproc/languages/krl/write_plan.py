@@ -51,7 +51,7 @@ class Components:
             self.own[chosen], self.decimals[chosen], self.start[chosen], self.stop[chosen], self.file[chosen]
         )
 
-    def kept(self, wanted: Floats) -> Bools:
+    def unchanged(self, wanted: Floats) -> Bools:
         """(K, 6) the components that are what is ``wanted`` (K, 6) [mm, deg] already, within half a step."""
         change = wanted - self.own
         change[:, 3:] = (change[:, 3:] + 180.0) % 360.0 - 180.0
@@ -161,15 +161,17 @@ class KrlWritePlan:
         """What the text says of rows (K,), what it is to say (K, 6) [mm, deg], and which of that it says already."""
         said, there = self.components(rows), self.own[rows]
         wanted = self.wanted(rows, said.own, self.plan.position[there], self.plan.rotation[there])
-        return said, wanted, said.kept(wanted)
+        return said, wanted, said.unchanged(wanted)
 
-    def texts(self, said: Components, wanted: Floats, kept: Bools, k: int) -> list[bytes]:
+    def texts(self, components: Components, wanted: Floats, kept: Bools, k: int) -> list[bytes]:
         """The six components of the ``k``-th motion of ``wanted`` (K, 6) [mm, deg] as they are to be written: as they
         are, where they stay: ``kept`` (K, 6)."""
         return [
-            self.documents[said.file[k, i]].raw[int(said.start[k, i]) : int(said.stop[k, i])].lstrip(b"+")
-            if kept[k, i] and said.start[k, i] >= 0
-            else fixed_one(float(wanted[k, i]), int(said.decimals[k, i]))
+            self.documents[components.file[k, i]]
+            .raw[int(components.start[k, i]) : int(components.stop[k, i])]
+            .lstrip(b"+")
+            if kept[k, i] and components.start[k, i] >= 0
+            else fixed_one(float(wanted[k, i]), int(components.decimals[k, i]))
             for i in range(6)
         ]
 

@@ -72,7 +72,7 @@ def module_toolpath(
         constraints=EditConstraints(
             refused=refused,
             locked=_locked(document, rows, flow, refused),
-            no_insert_before=_whole(rows, continues, refused),
+            no_insert_before=_no_insert_before(rows, continues, refused),
         ),
         orientation_control=OrientationControl(
             mode=rows.per_row([fact.orientation for fact in facts], np.int8)
@@ -198,12 +198,12 @@ def _pose(frame: FrameRef) -> Poses | None:
     return Poses.identity() if frame.number == 0 else frame.pose
 
 
-def _whole(rows: ModuleRows, continues: Bools, refused: Mapping[int, Finding]) -> dict[int, str]:
+def _no_insert_before(rows: ModuleRows, continues: Bools, refused: Mapping[int, Finding]) -> dict[int, str]:
     """Rows before which nothing can be inserted."""
     same = rows.quadrants >= 0
     same[1:] &= rows.quadrants[1:] == rows.quadrants[:-1]
     same[:1] = False
-    whole: dict[int, str] = {}
+    no_insert_before: dict[int, str] = {}
     for start, stop, fact in rows.each():
         text = rows.texts[start]
         if text is None or fact.arguments is None:
@@ -217,13 +217,13 @@ def _whole(rows: ModuleRows, continues: Bools, refused: Mapping[int, Finding]) -
             why = "its time is stated (\\T)"
         wordless = "" if text.target is not None and text.target.words else NO_WORDS
         for row in range(start, stop) if why or wordless else [start]:
-            whole[row] = why or wordless
+            no_insert_before[row] = why or wordless
         if not why and fact.checked is not False:
             for row in (start + np.flatnonzero(~same[start:stop])).tolist():
-                whole[row] = OTHER_QUADRANTS
+                no_insert_before[row] = OTHER_QUADRANTS
         if not continues[start]:
-            whole[start] = OTHER_PATHS
-    return {row: why for row, why in whole.items() if why and row not in refused}
+            no_insert_before[start] = OTHER_PATHS
+    return {row: why for row, why in no_insert_before.items() if why and row not in refused}
 
 
 def _locked(

@@ -32,7 +32,7 @@ def edit_targets(program: Program, plan: Plan, writing: WritingSettings) -> Edit
 class _Writer:
     def __init__(self, program: Program, plan: Plan, writing: WritingSettings) -> None:
         self.task = PlanWriter(program, plan, writing)
-        self.held: dict[int, Finding] = {}
+        self.refused: dict[int, Finding] = {}
 
     def edited(self) -> EditedTargets:
         task = self.task
@@ -43,9 +43,9 @@ class _Writer:
         numbers = (self._in_lines(part) for part in blocks(changed[plain]))
         inserted, unfit = insertions(task)
         for row, why in unfit.items():
-            self.hold(row, why, "RAP012")
-        if self.held:
-            return EditedTargets((), self.held)
+            self.refuse(row, why, "RAP012")
+        if self.refused:
+            return EditedTargets((), self.refused)
         return EditedTargets(Edits.collected(chain([edits, inserted], numbers)))
 
     def _in_lines(self, rows: Ints) -> Edits:
@@ -78,7 +78,7 @@ class _Writer:
             if numbers.changed():
                 unfit = task.unfit_arc(int(there[k]))
                 if unfit:
-                    self.hold(row, unfit, "RAP012")
+                    self.refuse(row, unfit, "RAP012")
                 yield from self._point(row, text, text.via, numbers)
 
     def _point(self, row: int, text: MotionText, point: PointText, numbers: PointNumbers) -> Iterator[Edit]:
@@ -94,13 +94,13 @@ class _Writer:
             return
         raw, (start, stop) = self.task.raw, point.operand
         if self.task.writing.shared_points == "keep":
-            self.hold(row, why)
+            self.refuse(row, why)
         elif not point.words:
-            self.hold(row, f"{why}, and its configuration or external axes are not known in numbers")
+            self.refuse(row, f"{why}, and its configuration or external axes are not known in numbers")
         elif b"\n" in raw[text.start : stop] or b"\r" in raw[text.start : stop]:
-            self.hold(row, f"{why}, and its statement runs over several lines")
+            self.refuse(row, f"{why}, and its statement runs over several lines")
         elif not set(raw[start:stop]) <= _OPERAND:
-            self.hold(row, f"{why}, and its target contains other signs than numbers and names")
+            self.refuse(row, f"{why}, and its target contains other signs than numbers and names")
         else:
             texts = self.task.spelt(point, numbers)
             if len(texts) == 3:
@@ -124,7 +124,7 @@ class _Writer:
             return f"{shown or 'its target'} is shared by several motions"
         return ""
 
-    def hold(self, row: int, why: str, code: str = "RAP015") -> None:
+    def refuse(self, row: int, why: str, code: str = "RAP015") -> None:
         document = self.task.program.documents[0]
         place = document.place(self.task.text(row).start)
-        self.held.setdefault(row, Finding(code, why, str(document.path), *place, HELP))
+        self.refused.setdefault(row, Finding(code, why, str(document.path), *place, HELP))

@@ -71,8 +71,8 @@ def _structure_problem(
         return None
     if listing.points[1] < 0:
         return len(listing.raw) - 1, "the file has no /POS, or no /END after it"
-    if listing.strange:
-        return min(listing.strange), "text in /MN is no statement"
+    if listing.unreadable:
+        return min(listing.unreadable), "text in /MN is no statement"
     if strange_points:
         return strange_points[0], "text in /POS is no point"
     opened = np.flatnonzero(listing.statements.columns()[:, -1] == 0)

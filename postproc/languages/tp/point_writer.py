@@ -36,7 +36,7 @@ class _PointWriter:
     def __init__(self, program: Program, plan: Plan, writing: WritingSettings) -> None:
         self.task = TpPlanNumbers(program, plan, writing)
         self.points = NewPoints(self.task)
-        self.held: dict[int, Finding] = {}
+        self.refused: dict[int, Finding] = {}
 
     def edited(self) -> EditedTargets:
         task = self.task
@@ -52,8 +52,8 @@ class _PointWriter:
         edits = list(self._in_text(chosen[~alone], rewritten))
         numbers = [self._in_points(part) for part in blocks(chosen[alone])]
         lines = self._inserted(divided)
-        if self.held:
-            return EditedTargets((), self.held)
+        if self.refused:
+            return EditedTargets((), self.refused)
         edited = bool(edits) or any(map(len, numbers))
         if self.points.texts:
             at = task.places.listing.points[1]
@@ -144,7 +144,7 @@ class _PointWriter:
     def _check_arc(self, row: int, motion: int) -> None:
         unfit = self.task.unfit_arc(motion)
         if unfit:
-            self.hold(row, unfit, "FTP012")
+            self.refuse(row, unfit, "FTP012")
 
     def _point(
         self, row: int, move: TpMove, which: int, point: TpPosition, numbers: SixNumbers
@@ -158,7 +158,7 @@ class _PointWriter:
             spans = point.groups[0].spans
             yield from (Edit(Span(0, *spans[name]), text) for name, text in changed.items())
         elif self.task.writing.shared_points == "keep":
-            self.hold(row, why)
+            self.refuse(row, why)
         else:
             number = self.points.add(point, changed, named=True)
             yield Edit(self.task.place(row, move.points[which].span), b"%d" % number)
@@ -197,7 +197,7 @@ class _PointWriter:
         if now:
             external = self.points.external(point, now, task.path.external[row].tolist())
             if external is None:
-                self.hold(row, "the external axes of an inserted motion are not known in numbers", "FTP022")
+                self.refuse(row, "the external axes of an inserted motion are not known in numbers", "FTP022")
             literals |= external or {}
         form = b"L"
         if via[0] == via[0]:
@@ -240,7 +240,7 @@ class _PointWriter:
         ):
             yield Edit(Span(0, span[0], span[0] + len(b"%d" % listing.count)), b"%d" % count)
 
-    def hold(self, row: int, why: str, code: str = "FTP015") -> None:
+    def refuse(self, row: int, why: str, code: str = "FTP015") -> None:
         document = self.task.program.documents[0]
         place = document.place(self.task.place(row, self.task.move(row).head).start)
-        self.held.setdefault(row, Finding(code, why, str(document.path), *place, HELP))
+        self.refused.setdefault(row, Finding(code, why, str(document.path), *place, HELP))

@@ -150,7 +150,7 @@ class TpPositions(Mapping[int, TpPosition]):
 def read_positions(raw: bytes, start: int, stop: int) -> tuple[TpPositions, list[int]]:
     """The points between two bytes by their numbers, and where text starts that is no point."""
     positions = TpPositions(raw)
-    strange: list[int] = []
+    unreadable: list[int] = []
     at = start
     while True:
         head = _HEAD.match(raw, at, stop)
@@ -158,11 +158,11 @@ def read_positions(raw: bytes, start: int, stop: int) -> tuple[TpPositions, list
             rest = re.compile(rb"\s*+").match(raw, at, stop)
             at = stop if rest is None else rest.end()
             if at >= stop:
-                return positions, strange
-            strange.append(at)
+                return positions, unreadable
+            unreadable.append(at)
             after = _NEXT.search(raw, at + 1, stop)
             if after is None:
-                return positions, strange
+                return positions, unreadable
             at = after.start()
             continue
         one, is_common = _position(raw, head, stop)

@@ -81,7 +81,7 @@ class TpListing:
 
     ``name``: start and stop of the program's name, -1 without; ``attributes``: name -> start and stop of the value;
     ``main``: start of the line after /MN, -1 without; ``points``: start of the line /POS and of the line after the
-    points (/END), -1 without, ``point_lines``: their lines, from 1; ``strange``: bytes of /MN that are no statement:
+    points (/END), -1 without, ``point_lines``: their lines, from 1; ``unreadable``: bytes of /MN that are no statement:
     start -> text.
     """
 
@@ -92,7 +92,7 @@ class TpListing:
     points: tuple[int, int] = (-1, -1)
     point_lines: tuple[int, int] = (0, 0)
     statements: NumberedStatements = field(init=False)
-    strange: dict[int, bytes] = field(default_factory=dict)
+    unreadable: dict[int, bytes] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.statements = NumberedStatements(self.raw)
@@ -157,7 +157,7 @@ def _main_line(listing: TpListing, at: int, stop: int, line: int) -> None:
         return
     more = _CONTINUED.match(raw, at, stop)
     if more is None:
-        listing.strange[at] = raw[at:stop].strip()
+        listing.unreadable[at] = raw[at:stop].strip()
         return
     one = NumberedStatement(more.end(), more.end(), b"", line, at, (-1, -1))
     _extend(raw, one, stop)

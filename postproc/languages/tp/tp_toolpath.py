@@ -89,23 +89,23 @@ def row_finding(document: Document, rows: TpRows, row: int, code: str, message: 
 
 def _not_before(rows: TpRows, continues: Bools, refused: Mapping[int, Finding]) -> dict[int, str]:
     """Rows before which nothing can be inserted."""
-    whole: dict[int, str] = {}
+    no_insert_before: dict[int, str] = {}
     for row, move in enumerate(rows.moves):
         if row in refused or move is None:
             continue
         if not continues[row]:
-            whole[row] = OTHER_PATHS
+            no_insert_before[row] = OTHER_PATHS
         elif move.own:
-            whole[row] = "its options count from its own start (TB, TA, DB, Arc Start)"
+            no_insert_before[row] = "its options count from its own start (TB, TA, DB, Arc Start)"
         elif move.unit in (b"sec", b"msec"):
-            whole[row] = "its time is stated"
+            no_insert_before[row] = "its time is stated"
         elif move.form == b"J":
-            whole[row] = "its path is that of the axes"
+            no_insert_before[row] = "its path is that of the axes"
         elif rows.nut[row] < 0 or rows.revolutions[row] < 0:
-            whole[row] = "its configuration is not read"
+            no_insert_before[row] = "its configuration is not read"
         elif row and rows.nut[row - 1] >= 0 and _differs(rows, row):
-            whole[row] = "its configuration is not that of the motion before"
-    return whole
+            no_insert_before[row] = "its configuration is not that of the motion before"
+    return no_insert_before
 
 
 def _differs(rows: TpRows, row: int) -> bool:

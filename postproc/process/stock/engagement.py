@@ -155,7 +155,7 @@ def engage(
     for side, share in enumerate((0.0, 1.0)):
         at = np.flatnonzero(known & (forces.share == share))
         along[forces.motion[at], side] = forces.wrench[at]
-    return replace(cut, along=along, profiles=forces.bent(), uneven=uneven)
+    return replace(cut, along=along, profiles=forces.piecewise(), uneven=uneven)
 
 
 def profiles_of(cutters: tuple[Cutter, ...]) -> Floats:
