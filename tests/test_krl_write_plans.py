@@ -84,6 +84,21 @@ def test_a_point_of_two_motions_that_want_the_same_is_edited_once() -> None:
     assert data == [POINT.replace("X 1.5", "X 2.000").strip()]
 
 
+@pytest.mark.parametrize("axis", [0, 2], ids=["C", "A"])
+def test_a_point_of_two_motions_whose_angle_passes_180_is_edited_once(axis: int) -> None:
+    """179.9998 and -179.9998 deg are 0.0004 deg apart: one correction within half a step, of any angle."""
+    point = "DECL POS XP1={X 1.5,Y 2,Z 3,A 0,B 0,C 0}\n"
+    program = read("LIN XP1\nPTP XP1 C_DIS\n", point)
+    turned = program.toolpath.rotation.copy()
+    for row, angle in enumerate((179.9998, -179.9998)):
+        turned[row] = rotation_from_vector(np.eye(3)[axis] * angle * DEG) @ turned[row]
+    wanted = dataclasses.replace(Plan.of(program.toolpath), rotation=turned)
+    lines, data = written(program, wanted)
+    assert lines == ["LIN XP1", "PTP XP1 C_DIS"]
+    key = "AC"[axis == 0]
+    assert data in ([point.replace(f"{key} 0", f"{key} {sign}180.000").strip()] for sign in ("", "-"))
+
+
 def test_a_point_of_motions_that_differ_stays_with_the_first_and_the_others_get_their_own() -> None:
     program = read("LIN XP1 C_DIS ;first\nLIN XP1 C_VEL\nLIN XP1\n", POINT)
     wanted = plan(program, r0=(0.5, 0, 0), r1=(0, 0.25, 0), r2=(0, 0.25, 0))
