@@ -1,6 +1,7 @@
-"""What people read is in the words of the field: command line, schemas, pages and terminal use none of the former ones.
+"""What people read is in the words of the field: command line, schemas, pages, terminal, findings and documents use none
+of the former ones; nor do the names of modules, classes, functions, parameters and fields.
 
-Findings are no part of this: their messages have their own rules.
+That messages of findings are sentences is in ``test_messages.py``.
 """
 
 from __future__ import annotations
@@ -37,9 +38,38 @@ ALLOWED = (
     r"link (?:geometry|gravity|compliance)",  # names of effects
     r"links?(?= \[mm\]| lengths?\b| geometry\b| before\b| that a joint\b)|bearings and links|URDF link",  # of an arm
     r"expected\sby chance",  # the term itself
+    r"symbolic link|[Aa] link (?:in the place|of)|that is a link|no link is followed",  # of a file system
+    r"parent link|the link(?= |$)|(?:base|own|tip|its) link|links(?= \(|, where|, in the order| of| with)|moments of the links",
+    r"external axes that do not",
+    r"drift of a stand",  # a tripod
     r"left and right step",  # keys of the keyboard
 )
 """What is no former word though it looks like one, and why."""
+
+IN_DOCUMENTS = (
+    r"left[ -]out|(?:is|was|are|be|one|ones|cut|entered|or|and|that|which) left|left (?:as|half|over|of|by)",  # remains
+    r"leaves? or left|to (?:its|the) left|left, .?right|left. or .right|[\"`]?left[\"`]?(?= or|\}|: right)|: left|material left",
+    r"on the way (?:out|back|in)",
+    r"links? (?:that|lengths|in|is|of|are|between|every|before|and|by)\b|rigid links|base and tip link|the next link"
+    r"|links and limits|Links and limits|Link lengths|base link|every report|further links|k the link|it links",
+    r"controller's own points",
+    r"stands? (?:upright|for|beside)|the links|numbers of links",
+    r"by chance",  # of statistics
+)
+"""What documents say besides in a sense that every reader knows: sides, parts of an arm, what remains, statistics."""
+
+FORMER_NAMES = re.compile(
+    r"doubts?|unsure|half_widths|ways|way|division|ration|pieces|task|state|blocks|beginning|begin|partly|holding|hold"
+    r"|meant|whole|given|anchor|pinned|timed|branches|any_plane|oriented|free_axis|slur|jumped|bulk|loose|unclear|strange"
+    r"|foreign|telling|judging|stands?|course|taken|foils?|rival|price|lack|asleep|upto|seen|unseen|offer|tour|suspicion"
+    r"|wild|gives_way|slack|motors_at|term|nudged|nudge|ending|publish|printable|give_back|large_apart|sheet|space|hands"
+    r"|made|found|told|said|held|kept|bent|behind|anew|survey"
+)
+"""The left column of the table of code terms, and the participles of its rules: what no name is, and no class."""
+
+NAMES = {
+}
+"""Former names that stay, and why: (name) -> reason."""
 
 TABLES_OF_FORMER_NAMES = {"result_keys.py"}
 

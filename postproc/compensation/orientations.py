@@ -17,7 +17,7 @@ _OPPOSITE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class MotionParts:
-    """Parts (K) of motions.  rows (K,): the motions; first, last (K,): where the parts begin and end, as shares of the
+    """Parts (K) of motions.  rows (K,): the motions; first, last (K,): where the parts start and end, as shares of the
     motions' paths; start, end (K, 3, 3): orientations there, in the robot base."""
 
     rows: Ints

@@ -57,7 +57,7 @@ def largest_disagreement(
 
 def without_effects(campaign: Campaign, fitted: Fit, gone: Sequence[Candidate]) -> Fit:
     """The fit with the effects ``gone`` at their null, all other parameters as they were estimated beside them; tracker
-    and targets found anew."""
+    and targets found again."""
     keys: set[tuple[int, str]] = set()
     for candidate in gone:
         keys |= keys_of(fitted.model, candidate).keys()

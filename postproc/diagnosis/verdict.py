@@ -69,7 +69,7 @@ WORST = 1.1
 
 
 CHANCE_OF_JOINT = 0.05
-"""Probability that any joint without an effect that is fitted to all of them is said to have it."""
+"""Probability that any joint without an effect that is fitted to all of them is reported to have it."""
 
 NOT_ENOUGH = "too much would remain for a name"
 AS_WELL = "another course over the same joint explains as much, and more remains than scatter"

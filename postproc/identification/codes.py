@@ -62,7 +62,7 @@ CODES = define(
             meaning="The rows have no load, or the same load everywhere.",
             consequence="The effect of a constant load cannot be separated from the geometry.",
             action="Measure poses with and without the load, or with loads of different size.",
-            example="A weight that hangs on the tool in all rows.",
+            example="A weight on the tool in all rows.",
         ),
         "IDN014": Code(
             "error",
@@ -84,10 +84,10 @@ CODES = define(
         ),
         "IDN032": Code(
             "warning",
-            "reflector mounted anew",
+            "reflector mounted again",
             meaning="Between two sessions a reflector was at different places of the tool.",
             consequence="It counts as another reflector in each session, so that the robot is not blamed for it.",
-            action="Give reflectors that were mounted anew other names.",
+            action="Give reflectors that were mounted again other names.",
             example="A nest that was taken off over night.",
         ),
         "IDN033": Code(
@@ -96,7 +96,7 @@ CODES = define(
             meaning="From one row on all readings are moved as a whole.",
             consequence="The rows from there on count as another session.",
             action="State a new SESSION where the tracker was moved.",
-            example="Somebody bumped the stand.",
+            example="Somebody bumped the tripod.",
         ),
         "IDN034": Code(
             "error",

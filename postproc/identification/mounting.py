@@ -1,4 +1,4 @@
-"""Reflectors that were mounted anew between sessions, and a tracker that was moved within one: what readings show of
+"""Reflectors that were mounted again between sessions, and a tracker that was moved within one: what readings show of
 how they were taken, before a robot is blamed for it."""
 
 from __future__ import annotations
@@ -72,15 +72,15 @@ def _moved_targets(campaign: Campaign, model: StiffnessModel) -> tuple[Readings,
         return readings, []
     names = readings.targets or ("target",)
     target = readings.target if readings.targets else np.zeros(len(readings), np.int64)
-    anew, fixed = {}, {*readings.places, *readings.on_base}
+    renamed, fixed = {}, {*readings.places, *readings.on_base}
     for k, name in enumerate(names):
         for s, session in enumerate(readings.sessions):
             if name not in fixed and (target[readings.session == s] == k).any():
-                anew[k, s] = f"{name} ({session})"
+                renamed[k, s] = f"{name} ({session})"
     kept = [name for name in names if name in fixed]
-    split = (*kept, *anew.values())
+    split = (*kept, *renamed.values())
     place = [
-        split.index(anew[k, s]) if (k, s) in anew else split.index(names[k])
+        split.index(renamed[k, s]) if (k, s) in renamed else split.index(names[k])
         for k, s in zip(target.tolist(), readings.session.tolist(), strict=True)
     ]
     changed = replace(readings, targets=split, target=np.array(place, np.int64))
@@ -95,7 +95,7 @@ def _moved_targets(campaign: Campaign, model: StiffnessModel) -> tuple[Readings,
             return readings, []
     words = []
     for k, name in enumerate(names):
-        places = [given.places[split.index(anew[k, s])] for s in range(sessions) if (k, s) in anew]
+        places = [given.places[split.index(renamed[k, s])] for s in range(sessions) if (k, s) in renamed]
         if len(places) > 1:
             by = max(float(np.linalg.norm(place - places[0])) for place in places[1:])
             if by > CLEAR * sizes[1] / np.sqrt(len(after) / sessions):
@@ -103,7 +103,7 @@ def _moved_targets(campaign: Campaign, model: StiffnessModel) -> tuple[Readings,
     if not words:
         return readings, []
     message = (
-        f"the reflector was mounted anew between sessions ({', '.join(words)}): one place leaves"
+        f"the reflector was mounted again between sessions ({', '.join(words)}): one place leaves"
         f" {sizes[0] / MM:.3g} mm RMS, one for each session {sizes[1] / MM:.3g} mm; it counts as another"
         " reflector in each session"
     )

@@ -79,7 +79,7 @@ class ReadingSettings:
 
 
 PLAIN = ReadingSettings()
-"""Nothing is said."""
+"""Nothing is stated."""
 
 
 @dataclass(frozen=True)

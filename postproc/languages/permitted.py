@@ -175,7 +175,7 @@ class _Look:
 
 
 def _any(mask: Bools, start: Ints, end: Ints) -> Bools:
-    """(K,) whether ``mask`` holds anywhere in the ranges begin .. end - 1 (K,)."""
+    """(K,) whether ``mask`` holds anywhere in the ranges start .. end - 1 (K,)."""
     if not mask.any():
         return np.zeros(len(start), np.bool_)
     count = np.zeros(len(mask) + 1, np.int32)

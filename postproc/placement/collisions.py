@@ -1,7 +1,7 @@
 """Collisions of the arm with itself and with what is fixed in the cell, by the collision shapes of a URDF.
 
 Pinocchio places the shapes (frames of their links), coal finds whether two of them overlap (Pan et al. 2012,
-doi:10.1109/ICRA.2012.6225337).  A URDF says nothing of how a controller counts its axes: it is taken only where its
+doi:10.1109/ICRA.2012.6225337).  A URDF does not state how a controller counts its axes: it is taken only where its
 joints bring the last link to where the robot file brings the flange, up to one constant frame.
 """
 

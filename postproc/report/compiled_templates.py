@@ -19,7 +19,7 @@ DIGEST = hashlib.sha256().digest_size
 class CompiledTemplates(BytecodeCache):
     """Compiled templates in ``folder``, a ``__pycache__`` beside them; each states the versions of Python and Jinja,
     and the digest of its source and of ``settings``, which says how it is compiled.  Where the folder takes no files,
-    or Python writes none (PYTHONDONTWRITEBYTECODE), templates are compiled anew."""
+    or Python writes none (PYTHONDONTWRITEBYTECODE), templates are compiled again."""
 
     def __init__(self, folder: Path, settings: bytes) -> None:
         self.folder, self.settings = folder, settings

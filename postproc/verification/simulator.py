@@ -273,7 +273,7 @@ class Simulator:
         more: tuple[Ints, Floats],
     ) -> PathSamples:
         """``samples`` of the ``motions``, stretches (R,) and rows (R,), and those at shares (M,) of the rows (M,)
-        ``more``; the stretches of these alone are placed anew."""
+        ``more``; the stretches of these alone are placed again."""
         stretch, rows = motions
         some = np.isin(stretch, stretch[np.searchsorted(rows, more[0])])
         stretch, rows = stretch[some], rows[some]

@@ -68,17 +68,22 @@ def record_path(job: CutProgram, program: Path) -> Path:
 
 
 def remember(
-    job: CutProgram, main: Request, named: Sequence[MeasuredPart], path: Path, anew: bool, next_folder: Path
+    job: CutProgram,
+    main: Request,
+    named: Sequence[MeasuredPart],
+    path: Path,
+    new_history: bool,
+    next_folder: Path,
 ) -> Remembered:
     """The parts of the record at ``path`` and those ``named`` now.  Raises Refusal LRN001, LRN015.
 
-    anew: without what the record holds; next_folder: of the next program.
+    new_history: without what the record holds; next_folder: of the next program.
     """
     inputs = _inputs(job)
     new = PartHistory(inputs[main.program.name], main.force or "", inputs)
     raw = read_file(path, LARGEST) if path.is_file() else None
     kept = [next_folder / KEPT]
-    if raw is None or anew:
+    if raw is None or new_history:
         _refuse_counted_twice(job.ready.robot, named)
         return Remembered(path, new, raw, tuple(named), tuple(kept))
     try:

@@ -20,7 +20,7 @@ from postproc.robot.provenance import Identification
 from postproc.robot.write_robot_file import WrittenEffect, WrittenParameter, robot_file
 
 SAME_WIDTH, SAME_PLACE = 0.97, 0.05
-"""Share of the deviation before that is left, and of it by which the value moved, where a part says nothing of it."""
+"""Share of the deviation before that is left, and of it by which the value moved, where a part does not show it."""
 
 
 def is_observed(cause: Cause, value: float, deviation: float) -> bool:

@@ -42,7 +42,7 @@ def tool_errors(result: Attribution, cell: Cell, sides: Mapping[str, int]) -> di
 def tool_error_lines(
     result: Attribution, parts: Sequence[MeasuredPart], cell: Cell, sides: Mapping[str, int]
 ) -> bytes:
-    """``tool_errors:`` for the cell; those of ``cell`` are in it; empty where the part says nothing of a tool."""
+    """``tool_errors:`` for the cell; those of ``cell`` are in it; empty where the part shows nothing of a tool."""
     entries: dict[int, list[str]] = {}
     walls: dict[int, Mapping[str, int]] = {}
     observed = False

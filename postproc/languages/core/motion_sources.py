@@ -41,7 +41,7 @@ def met(own: frozenset[Source], other: frozenset[Source], meeting: Meeting) -> f
 
 
 def expanded(sources: Iterable[Source], seen: set[Meeting]) -> set[int]:
-    """What is among sources, with those behind meetings that are not in ``seen``, to which they are added."""
+    """What is among sources, with those after meetings that are not in ``seen``, to which they are added."""
     found: set[int] = set()
     todo = list(sources)
     while todo:

@@ -69,7 +69,7 @@ def grouped(refused: Mapping[int, Finding], lines: Ints) -> list[Finding]:
 
 
 def moving_external(external: Floats) -> tuple[int, str] | None:
-    """The first row at which an external axis is not where it was first, and what is said there; external (N, 6)."""
+    """The first row at which an external axis is not where it was first, and what is stated there; external (N, 6)."""
     moving = []
     for axis in range(6):
         values = external[:, axis]
@@ -95,5 +95,5 @@ def not_understood(
 
 
 def shown(text: bytes) -> str:
-    """The begin of a statement as messages have it."""
+    """The start of a statement as messages have it."""
     return " ".join(text.decode("latin-1").split())[:60]

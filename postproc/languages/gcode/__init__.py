@@ -30,7 +30,7 @@ class GcodeDialect:
     """G-code of one control as a ``Dialect``.
 
     control: its table, with what a program of these bytes names; made where it is asked for, as tables take their time
-    to build.  semicolon: comments begin with one, parentheses are none.
+    to build.  semicolon: comments start with one, parentheses are none.
     """
 
     name: str
@@ -78,7 +78,7 @@ class GcodeDialect:
         return writer.edit_targets(program, plan, writing)
 
     def marked(self, program: Program, text: str) -> Edit:
-        """The mark as a comment line behind ``%`` and the program's number; parentheses in ``text`` become brackets."""
+        """The mark as a comment line after ``%`` and the program's number; parentheses in ``text`` become brackets."""
         plain = MARK + text.replace("(", "[").replace(")", "]")
         said = (f";{plain}" if self.semicolon else f"({plain})").encode("latin-1", "replace")
         return put_mark(program, said)

@@ -1,8 +1,8 @@
 """Arcs: centre and sweep from I J K, from R, or from a point between.
 
 In the plane, with u, v the first and second axis of G17 (X, Y), G18 (Z, X), G19 (Y, Z) and w the third:
-centre c = begin + (i, j), or (i, j) where they are absolute.  With R: c = m + n sqrt(R^2 - d^2/4), m the middle between
-begin and end, d their distance, n the normal of the chord on the side that the sense and the sign of R choose.
+centre c = start + (i, j), or (i, j) where they are absolute.  With R: c = m + n sqrt(R^2 - d^2/4), m the middle between
+start and end, d their distance, n the normal of the chord on the side that the sense and the sign of R choose.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ SAME = 1e-9
 """[m] an arc whose end is as near to its start is a full circle."""
 
 ABSOLUTE, RELATIVE, MOST = 1e-5, 1e-3, 1e-4
-"""[m, 1, m] radii at begin and end may differ by ABSOLUTE, or what the control allows instead, or by RELATIVE of the
+"""[m, 1, m] radii at start and end may differ by ABSOLUTE, or what the control allows instead, or by RELATIVE of the
 radius, but by no more than MOST."""
 
 
 @dataclass(frozen=True, eq=False)
 class ArcGeometry:
     """centre (N, 3) [m], normal (N, 3), sweep (N,) > 0 [rad], in the frame of the program; wrong (N,): 0, or why there
-    is none: 1 begin or end not known, 2 no centre, 3 radii differ, 4 R too short or a full circle, 5 no plane,
+    is none: 1 start or end not known, 2 no centre, 3 radii differ, 4 R too short or a full circle, 5 no plane,
     6 three points on a line."""
 
     centre: Floats
@@ -53,20 +53,20 @@ class ArcWords(NamedTuple):
 
 
 def arcs(
-    begin: Floats, end: Floats, plane: Ints, words: ArcWords, gap: Floats | float = ABSOLUTE
+    start: Floats, end: Floats, plane: Ints, words: ArcWords, gap: Floats | float = ABSOLUTE
 ) -> ArcGeometry:
     """The arcs of N blocks.
 
-    begin, end (N, 3) [m]; plane (N,) 0, 1, 2, -1 not known; gap (N,) [m]: what the control allows the radii at begin
+    start, end (N, 3) [m]; plane (N,) 0, 1, 2, -1 not known; gap (N,) [m]: what the control allows the radii at start
     and end to differ by, whatever their size.
     """
-    n = len(begin)
+    n = len(start)
     counter, ijk, absolute, radius, turns = words
     wrong = np.zeros(n, np.int64)
     rows = np.arange(n)
     axes = PLANES[np.maximum(plane, 0)]
     u, v, w = axes.T
-    b = np.stack([begin[rows, u], begin[rows, v]], 1)
+    b = np.stack([start[rows, u], start[rows, v]], 1)
     e = np.stack([end[rows, u], end[rows, v]], 1)
     sense = np.where(counter, 1.0, -1.0)
 
@@ -91,9 +91,9 @@ def arcs(
         apart = np.abs(near - far) > np.minimum(np.maximum(gap, RELATIVE * np.maximum(near, far)), MOST)
         short = (np.abs(radius) < d / 2 - ABSOLUTE) | (d < SAME)
 
-    start = np.arctan2(b[:, 1] - centre[:, 1], b[:, 0] - centre[:, 0])
+    angle = np.arctan2(b[:, 1] - centre[:, 1], b[:, 0] - centre[:, 0])
     stop = np.arctan2(e[:, 1] - centre[:, 1], e[:, 0] - centre[:, 0])
-    sweep = np.mod(sense * (stop - start), 2 * np.pi)
+    sweep = np.mod(sense * (stop - angle), 2 * np.pi)
     sweep = np.where(d < SAME, 2 * np.pi, sweep) + 2 * np.pi * turns
 
     third = ijk[rows, w]
@@ -105,10 +105,10 @@ def arcs(
         ~np.isfinite(sweep) | (turns < 0)
     ]
     wrong[plane < 0] = 5
-    unknown = ~(np.isfinite(begin).all(axis=1) & np.isfinite(end).all(axis=1))
+    unknown = ~(np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1))
     wrong[unknown & (wrong != 5) & (by_centre | by_radius)] = 1
 
-    place = np.array(begin)
+    place = np.array(start)
     place[rows, u], place[rows, v] = centre.T
     normal = np.zeros((n, 3))
     normal[rows, w] = sense

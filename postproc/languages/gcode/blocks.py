@@ -115,7 +115,7 @@ class BlockWords:
         return replace(self, modal=modal)
 
     def part(self, start: int, stop: int) -> BlockWords:
-        """The blocks begin .. stop - 1 of a whole program."""
+        """The blocks start .. stop - 1 of a whole program."""
         modal = self.modal.part(start, stop)
         return BlockWords(self.source, modal, self.control, self.columns, self.integers, start, stop)
 
@@ -316,7 +316,7 @@ def frame_events(
     linear = np.arange(6) < 3
 
     def lose(where: Bools, rows: Bools, why: str) -> None:
-        """Leaves coordinates unknown behind ``rows``: those of ``where`` (B, 6) or (6,)."""
+        """Leaves coordinates unknown after ``rows``: those of ``where`` (B, 6) or (6,)."""
         if rows.any():
             lost[rows] |= np.broadcast_to(where, (n, 6))[rows]
             reason[rows] = reasons.number(why)

@@ -93,7 +93,7 @@ _TIP = {
     **dict.fromkeys((434, 2340), (ModalCode(Group.LENGTH, 1), ModalCode(Group.FOREIGN, 0))),
     435: (ModalCode(Group.LENGTH, 1), ModalCode(Group.FOREIGN, 1)),
 }
-"""G43 and G49 end the modes that G43.1, G43.4 and G43.5 begin; under the last, I J K are a direction of the tool."""
+"""G43 and G49 end the modes that G43.1, G43.4 and G43.5 start; under the last, I J K are a direction of the tool."""
 
 _ARGUMENTS = {
     **dict.fromkeys(

@@ -183,7 +183,7 @@ class Control:
     codes: G number times ten -> what it says; also: what else some of them say; named: a word that is alone ->
     the same; names: addresses of more than a letter -> their key; comment: pattern of comments (and of strings,
     group 1, which are none); line: takes a line apart that is not plain words; start: what is in force before
-    anything is said. endings: M codes after which nothing is read; cycle_apart: G80 goes back to the move that was
+    anything is stated. endings: M codes after which nothing is read; cycle_apart: G80 goes back to the move that was
     in force before the cycle; increments: a length without a decimal point may count increments; turns: key of the
     word that gives the turns of an arc, and how many of them an arc without the word has. frame: the frame after a
     block with G52, G92 ... or Once.FRAME; columns: keys of further words of motions. angles: what A, B, C do where

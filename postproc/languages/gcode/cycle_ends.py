@@ -106,7 +106,7 @@ def cycle_ends(words: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
     loose = np.maximum.accumulate(np.where(moved, number, -1), axis=0)
     uncertain = np.cumsum(anywhere)
     lost = np.cumsum(leaves_unknown(words, lengths) | anywhere)
-    # A cycle that says nothing of R, G98, G99 and the frame ends as the one before it.
+    # A cycle that does not state R, G98, G99 and the frame ends as the one before it.
     says = has_plane[rows] | ~absolute[rows] | (words.move[rows - 1] != Move.CYCLE)
     for state in (axis, frame, back, uncertain):
         says[1:] |= state[rows[1:]] != state[rows[:-1]]

@@ -52,7 +52,7 @@ def diagnostics(
 
     def add_at(at: Ints, code: str, message: str) -> None:
         at = at[live[at]]
-        # subprograms are behind what calls them, wherever they are in the file
+        # subprograms are after what calls them, wherever they are in the file
         at = at[np.argsort(blocks.line[at], kind="stable")]
         if len(at):
             many = (

@@ -33,7 +33,7 @@ from postproc.languages.gcode.words import key
 MACRO = 65
 """G65 calls as M98, with values for variables."""
 RESTARTS = 20
-"""How often a program is followed anew with more that may run or not."""
+"""How often a program is followed again with more that may run or not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ def execute(
     source: Source, control: Control, symbols: Mapping[str, object], own: int | None = None
 ) -> Execution:
     """The run of a program; ``symbols``: values of names that only the controller knows; own: blocks of the program
-    itself: those behind them are of other files, and where they do not run they are not in the run."""
+    itself: those after them are of other files, and where they do not run they are not in the run."""
     n = len(source.blocks)
     nothing = np.zeros(n, np.bool_)
     tape = tape_blocks(source)

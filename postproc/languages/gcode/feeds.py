@@ -91,7 +91,7 @@ _FLOW = (2.0, 17.0, 30.0, 97.0, 98.0, 99.0)
 
 def with_stops(blend: Floats, words: BlockWords, rows: Ints) -> Floats:
     """(N,) [m] ``blend`` (N,) of the motions in blocks ``rows`` (N,), as of ``blends``, but 0 where the control stops
-    after a motion whatever its path mode, because a dwell or a halt is behind it, and NaN where it may: controls differ
+    after a motion whatever its path mode, because a dwell or a halt is after it, and NaN where it may: controls differ
     in whether they blend over other M and tools."""
     codes = words.words(key("M"))
     called = np.isin(codes.value, _FLOW)

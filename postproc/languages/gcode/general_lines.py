@@ -153,7 +153,7 @@ def line(text: bytes) -> LexedLine:
             break
     opened = any(text.count(one) > text.count(other) for one, other in ((b"[", b"]"), (b"#<", b">")))
     if words and (opened or text.rstrip().endswith(b"#")):
-        # What is put behind such a line would belong to its expression.
+        # What is put after such a line would belong to its expression.
         note("unknown", text.strip())
     return LexedLine(words, notes, deleted)
 

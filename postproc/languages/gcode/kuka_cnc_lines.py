@@ -38,7 +38,7 @@ WEIGHTS = frozenset(
 QUIET = frozenset(
     b"SLOPE MSG ERROR SET HSC DYN SPLINE CONTOUR COMP FILTER PSET FLUSH VELO EDM TIME STOP DIST FACTOR".split()
 )
-"""Commands that say nothing of where motions go."""
+"""Commands that do not state where motions go."""
 
 
 class KukaCncLines:

@@ -46,7 +46,7 @@ _UNTAPED = bytes(32 if byte in (0, 2, 3, 4, 17, 18, 19, 20, 26) else byte for by
 
 
 def lex(raw: bytes, control: Control, start: int = 0, end: int | None = None, line: int = 1) -> Text:
-    """The words, blocks and notes of ``raw[begin:end]``, which are whole lines, the first of them number ``line``.
+    """The words, blocks and notes of ``raw[start:end]``, which are whole lines, the first of them number ``line``.
 
     Never raises on its content; in linear time.
     """

@@ -94,7 +94,7 @@ class Modal:
         return switched(self.force[group], self.ahead[group])
 
     def part(self, start: int, stop: int) -> Modal:
-        """The blocks begin .. stop - 1."""
+        """The blocks start .. stop - 1."""
         rows = slice(start, stop)
         ahead = {group: int(force[start - 1]) for group, force in self.force.items()} if start else self.ahead
         return Modal(

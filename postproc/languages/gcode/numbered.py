@@ -25,7 +25,7 @@ LENGTH_CODES = (43.0, 43.4, 43.5, 234.0)
 SYSTEM = ((5201, 5400), (7001, 7999), (14001, 20000))
 """Variables that are work offsets: of Fanuc and Haas (7001, 14001: G54.1 Pn), 5211 to 5400 of LinuxCNC."""
 LENGTHS = ((2000, 2200), (2200, 2400), (10000, 10999), (11000, 11999))
-"""Variables of a Fanuc behind the first number are lengths of tools, or the wear of these, up to the second."""
+"""Variables of a Fanuc after the first number are lengths of tools, or the wear of these, up to the second."""
 
 _BASE_FRAME = re.compile(
     r"\$(?:P_(?:(?!PFRAME)[A-Z0-9]*FRAME|(?!UIFR)[A-Z0-9]*FR)|AA_(?:OFF|ETRANS|DRF))(?![A-Z])", re.I
@@ -181,8 +181,8 @@ def _rewritten(
         if found is None:
             continue
         number = None if found[1] is None else int(found[1])
-        begin = min(begins.values(), default=len(used)) if number is None else begins.get(number, len(used))
-        if begin < note.block:
+        start = min(begins.values(), default=len(used)) if number is None else begins.get(number, len(used))
+        if start < note.block:
             yield note.block, number
 
 

@@ -26,7 +26,7 @@ class OrientationWords(Protocol):
 
     words: their keys, -1 for one that is not used.  joint: the words are one whole: a block that writes one of them
     states all (those it leaves out are zero).  angles: the numbers are degrees, 360 of which are a turn.
-    redundant_axis (3,): unit vector in tool axes about which the words say nothing of the turn; NaN where they say all.
+    redundant_axis (3,): unit vector in tool axes about which the words do not state the turn; NaN where they state all.
     """
 
     @property

@@ -98,7 +98,7 @@ class Trace:
         return found
 
     def _turn(self, event: int, left: Bools) -> None:
-        """Goes on in the frame behind ``event``; behind too many nothing is known.  left (6,): coordinates that are
+        """Goes on in the frame after ``event``; after too many nothing is known.  left (6,): coordinates that are
         unknown already before it."""
         self._here = np.where(left, np.nan, self._here)
         self._origin = np.where(left, event, self._origin)

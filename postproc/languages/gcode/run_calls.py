@@ -161,7 +161,7 @@ class RunCalls(RunState):
         return start
 
     def hide(self, block: int) -> None:
-        """Has the program followed anew, with what a block opens or calls as what may run or not.  Raises RunAgain."""
+        """Has the program followed again, with what a block opens or calls as what may run or not.  Raises RunAgain."""
         self.opaque.add(block)
         raise RunAgain
 

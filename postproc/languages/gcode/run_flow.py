@@ -176,15 +176,15 @@ class RunFlow(RunCalls):
         return inside if holds else behind
 
     def leaves_oddly(self, around: Construct, verb: Verb) -> bool:
-        """Whether LinuxCNC may not do what a BREAK or CONTINUE says: it has none of a REPEAT, and behind a CONTINUE of
+        """Whether LinuxCNC may not do what a BREAK or CONTINUE says: it has none of a REPEAT, and after a CONTINUE of
         a DO it goes on with a WHILE that a BREAK should end."""
         return around.verb == Verb.REPEAT or (
             around.verb == Verb.WHILE and verb == Verb.BREAK and self.continues_do
         )
 
     def counts_on(self, around: Construct) -> bool:
-        """Whether LinuxCNC may run a REPEAT another number of times than it states: behind a CONTINUE of a DO it counts
-        it anew at its end, and one that was left from within goes on with what was left of its count."""
+        """Whether LinuxCNC may run a REPEAT another number of times than it states: after a CONTINUE of a DO it counts
+        it again at its end, and one that was left from within goes on with what was left of its count."""
         return self.continues_do or self.repeats.get(around.start, -1) >= 0
 
     def counted(self, around: Construct, ahead: bool) -> float:

@@ -170,7 +170,7 @@ _NORMAL = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 
 
 def frame(event: Event) -> ProgrammedFrame:
-    """The programmable frame behind TRANS, ROT ...: absolute ones take the place of the whole frame, A... ones go
+    """The programmable frame after TRANS, ROT ...: absolute ones take the place of the whole frame, A... ones go
     on from it.  ROT X Y Z turns about Z, the new Y, the new X; RPL= about the axis normal to the plane.  CYCLE800
     without a plane leaves no frame.  Scales, mirrors and frames that come from the machine are not read: where they
     are in force the place is not known."""

@@ -56,7 +56,7 @@ def assigned_end(text: bytes, at: int) -> int:
 
 
 def is_open(text: bytes) -> bool:
-    """Whether a string, a bracket or a sum does not close: what is put behind such a line would belong to it."""
+    """Whether a string, a bracket or a sum does not close: what is put after such a line would belong to it."""
     rest = _CLOSED.sub(b"0", text).rstrip()
     return (
         b'"' in rest
@@ -66,7 +66,7 @@ def is_open(text: bytes) -> bool:
 
 
 def bracket_end(text: bytes, at: int) -> int:
-    """Behind the bracket that closes the one at ``at``; the end of the line where none does."""
+    """After the bracket that closes the one at ``at``; the end of the line where none does."""
     depth = 0
     for place in range(at, len(text)):
         depth += (text[place] in b"([") - (text[place] in b")]")

@@ -31,7 +31,7 @@ SETTINGS = frozenset(
     b"ADIS ADISPOS CTOL OTOL ATOL FGREF FL FA FD FZ FRC FRCM ACC OVRA OVRRAP ACCLIMA JERKLIMA VELOLIMA STAT TU "
     b"TOFFR SF SD SR SRA STA SVC FP FMA DISC DISR DISCL LIMS MEAC THETA PHI PSI DC FXST FXSW FOC".split()
 )
-"""Addresses that say nothing of where a motion goes."""
+"""Addresses that do not state where a motion goes."""
 
 SWITCHES: Mapping[bytes, bytes] = {
     b"TOFF": b"TOFF", b"TOFFL": b"TOFF", b"TOFFLR": b"TOFF", b"DL": b"TOFF", b"TCARR": b"TCARR", b"RNDM": b"RNDM",
@@ -270,7 +270,7 @@ class _Taken:
         return max(close, behind + 1)
 
     def arguments(self, end: int) -> int:
-        """Behind the brackets that follow, if there are any."""
+        """After the brackets that follow, if there are any."""
         at = end
         while at < len(self.text) and self.text[at] in b" \t":
             at += 1

@@ -79,7 +79,7 @@ class GcodeSourceMap(WriterState):
     folded: FoldedNumbers
 
     def part(self, start: int, stop: int) -> SourceMapPart:
-        """The rows begin .. stop - 1 with their words."""
+        """The rows start .. stop - 1 with their words."""
         rows = slice(start, stop)
         columns = (*COLUMNS, *self.control.columns)
         state = {name: getattr(self, name)[rows] for name in STATE}

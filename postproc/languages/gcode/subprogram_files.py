@@ -1,4 +1,4 @@
-"""Subprograms in files of their own beside a program: which are called, and the text with them behind it."""
+"""Subprograms in files of their own beside a program: which are called, and the text with them after it."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class JoinedText:
 
 
 def join(raw: bytes, files: Sequence[Document], control: Control) -> JoinedText:
-    """A program and, behind its end, the files that it calls, each as a program of its name."""
+    """A program and, after its end, the files that it calls, each as a program of its name."""
     source = scan(raw, control)
     if not files:
         return JoinedText(source, len(raw))

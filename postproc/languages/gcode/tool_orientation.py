@@ -87,7 +87,7 @@ class ToolOrientations:
     """The orientation of the motions of a program, which come block by block."""
 
     def __init__(self, words: BlockWords, turned: Floats | None) -> None:
-        """given: the whole program; turned (3, 3): the tool in the base at A = B = C = 0; None where none is said."""
+        """given: the whole program; turned (3, 3): the tool in the base at A = B = C = 0; None where none is stated."""
         self._given, self._turned = words, turned
         self._tcp = words.modal.force[Group.TCP] == 1
         self._used = np.array([len(words.words(one)) > 0 for one in _ROTARY_KEYS])
@@ -216,7 +216,7 @@ def _kinds(words: BlockWords, tcp: Bools, rotary: bool) -> tuple[Ints, Ints]:
 def _machine(
     where: Positions, rows: Ints, rapid: Bools, used: Bools, tcp: Bools, kind: Ints, result: ToolOrientation
 ) -> None:
-    """Motions without a TCP mode: their rotary axes have to be at 0 from begin to end."""
+    """Motions without a TCP mode: their rotary axes have to be at 0 from start to end."""
     end, start = np.where(used, where.end[rows, 3:], 0.0), np.where(used, where.start[rows, 3:], 0.0)
     unknown = np.isnan(end).any(axis=1)
     away = (np.abs(end) > WHOLE).any(axis=1) | (~rapid & (np.abs(start) > WHOLE).any(axis=1))

@@ -188,7 +188,7 @@ def _positions(motions: WrittenMotions, sheet: _Sheet, before: Floats) -> Follow
 
 
 def _reached(motions: WrittenMotions, start: Floats) -> Floats:
-    """(M, 3) where the motions end, in their frames; of refused ones what the motion behind knows of it."""
+    """(M, 3) where the motions end, in their frames; of refused ones what the motion after knows of it."""
     places, row = motions.places, motions.row
     wanted = motions.text.units(row, motions.plan.position)
     following = np.append(row[1:], motions.last)

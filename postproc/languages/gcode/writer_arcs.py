@@ -127,7 +127,7 @@ def _in_plane(arcs: ArcsToWrite, vectors: Floats) -> Floats:
 
 
 def _balanced(arcs: ArcsToWrite) -> Floats:
-    """Centres at the same distance from begin and end: shifted along the chord, by what the radii differ times radius /
+    """Centres at the same distance from start and end: shifted along the chord, by what the radii differ times radius /
     chord.  Circles that nearly close stay: there that moves the far side by many digits."""
     axes = PLANES[arcs.plane, :2]
     start, end, centre = (_in_plane(arcs, p) for p in (arcs.start, arcs.end, arcs.centre))
@@ -154,7 +154,7 @@ def _distance(arcs: ArcsToWrite, one: Floats, other: Floats) -> Floats:
 
 def _missed(arcs: ArcsToWrite, number: Floats, through: Bools, by_radius: Bools) -> tuple[Floats, Floats]:
     """(K,) how far the way that the written numbers state is from the planned one, NaN where it is none or turns
-    otherwise; (K,) how much the radii at begin and end differ.  In written steps."""
+    otherwise; (K,) how much the radii at start and end differ.  In written steps."""
     count = len(arcs.sweep)
     normal = np.zeros((count, 3))
     normal[np.arange(count), PLANES[arcs.plane, 2]] = np.where(arcs.clockwise, -1.0, 1.0)

@@ -145,7 +145,7 @@ def _completed(blocks: BlockInsertions, motions: Ints) -> Edits:
 
 
 def _closed(raw: bytes, at: int) -> int:
-    """Behind the brackets of AC( and IC( that close after a number."""
+    """After the brackets of AC( and IC( that close after a number."""
     found = _CLOSED.match(raw, at)
     return found.end() if found else at
 

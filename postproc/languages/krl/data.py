@@ -35,7 +35,7 @@ from postproc.languages.krl.variables import Entry
 from postproc.toolpath.initial_state import Symbol
 
 DEFAULTS = b"DEF_"
-"""Begin of the names that KUKA's bas.src takes its defaults from; other numbers of other files may change."""
+"""Start of the names that KUKA's bas.src takes its defaults from; other numbers of other files may change."""
 
 _POINT_KEYS = frozenset([*COMPONENTS, *AXES, *EXTERNAL, b"S", b"T"])
 
@@ -45,7 +45,7 @@ class Declarations:
     """By name, upper case.
 
     values: points and constants; records: FDAT, LDAT, PDAT (key -> value); types: as they are declared; lines: name of
-    a point with its index -> its declaration's line, where another one can be behind; shared: names that other
+    a point with its index -> its declaration's line, where another one can be after; shared: names that other
     programs know too; origin: what only another file declares -> that file; frames: entries of
     BASE_DATA and TOOL_DATA in the controller's own files -> X..C [mm, deg], and the file.
     """

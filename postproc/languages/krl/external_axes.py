@@ -49,7 +49,7 @@ def _moved(before: float, by: float) -> float:
 
 
 def by_themselves(before: Numbers, code: bytes) -> Numbers:
-    """Where the axes are behind ASYPTP and its like, which send them on a way of their own: nobody knows."""
+    """Where the axes are after ASYPTP and its like, which send them on a way of their own: nobody knows."""
     named = {int(digit) - 1 for digit in _AXIS.findall(code)} or set(range(6))
     return six([COMPUTED if axis in named else value for axis, value in enumerate(before)])
 

@@ -88,7 +88,7 @@ class Activation:
 @dataclass
 class Unfollowed:
     """What earlier passes found: starts of blocks and routines that are not followed; (start of the routine, name) of
-    labels behind which nothing is known; whether no loop, call or jump is followed at all."""
+    labels after which nothing is known; whether no loop, call or jump is followed at all."""
 
     blocks: set[int] = field(default_factory=set)
     labels: set[tuple[int, bytes]] = field(default_factory=set)

@@ -193,7 +193,7 @@ def _copied(task: KrlWritePlan, block: Ints, rows: Ints, start: Ints) -> Bools:
         & (places.stop[rows] <= last[:, None])
     )
     many: Bools = here.all(axis=1) & task.is_inline[rows] & (task.plan.role[block] == Role.INTERMEDIATE)
-    # what ends exactly gets a word of its own: that of a LIN, behind nothing else
+    # what ends exactly gets a word of its own: that of a LIN, after nothing else
     many &= (task.path.approximation[rows] != 0) | ((last == end) & (raw[word] & 0xDF == ord("L")))
     many &= word - start <= _DEEPEST
     if task.plan.external is not None:
@@ -205,7 +205,7 @@ def _copied(task: KrlWritePlan, block: Ints, rows: Ints, start: Ints) -> Bools:
 
 
 def _copies(
-    task: KrlWritePlan, rows: Ints, components: Components, wanted: Floats, kept: Bools, begin: Ints
+    task: KrlWritePlan, rows: Ints, components: Components, wanted: Floats, kept: Bools, line_start: Ints
 ) -> Edits:
     """The lines of segments (K,): the bytes of their source between its literals, and the numbers.
 
@@ -224,7 +224,7 @@ def _copies(
         np.take_along_axis(wanted, order, axis=1),
         np.take_along_axis(components.decimals, order, axis=1),
     )
-    low = int(begin.min())
+    low = int(line_start.min())
     texts, ends = fixed(numbers[new], decimals[new], LETTER[task.raws[0][start - 1]][new])
     newline = task.documents[0].newline
     source = np.concatenate(
@@ -236,7 +236,7 @@ def _copies(
     size = len(source) - len(texts) - len(APPROXIMATION) - len(newline)
     parts = np.empty((len(rows), 15), np.int64)
     lengths = np.empty((len(rows), 15), np.int64)
-    parts[:, 0], lengths[:, 0] = begin - low, start[:, 0] - begin
+    parts[:, 0], lengths[:, 0] = line_start - low, start[:, 0] - line_start
     parts[:, 1:12:2], lengths[:, 1:12:2] = start - low, stop - start
     parts[:, 2:13:2] = stop - low
     lengths[:, 2:11:2], lengths[:, 12] = start[:, 1:] - stop[:, :-1], end - stop[:, 5]
@@ -246,5 +246,5 @@ def _copies(
     parts[:, 1:12:2][new] = size + ends[:-1]
     lengths[:, 1:12:2][new] = np.diff(ends)
     blob = gathered(source, parts.ravel(), lengths.ravel())
-    at = begin.astype(task.places.motion.dtype)
+    at = line_start.astype(task.places.motion.dtype)
     return Edits(np.zeros(len(rows), np.int8), at, at, blob, sums(lengths.sum(axis=1)))

@@ -256,7 +256,7 @@ def _marker(raw: bytes) -> Span | None:
 
 
 def _marker_at(document: Document, code: Sequence[Item]) -> Span:
-    """Behind the first DEF line; without one after the header lines."""
+    """After the first DEF line; without one after the header lines."""
     for item in code:
         if isinstance(item, Statement) and item.kind == "def":
             behind = document.raw.find(b"\n", item.at) + 1 or len(document.raw)

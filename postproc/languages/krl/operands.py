@@ -31,8 +31,8 @@ _HOME = re.compile(rb"X?HOME[1-5]?\Z")
 
 
 class Parts(NamedTuple):
-    """A motion statement taken apart; offsets in its code.  points: begin and end of what is between commas;
-    approximations: approximation words; reference: begin and end of #BASE or #TOOL; clause: WITH and what follows; odd:
+    """A motion statement taken apart; offsets in its code.  points: start and end of what is between commas;
+    approximations: approximation words; reference: start and end of #BASE or #TOOL; clause: WITH and what follows; odd:
     what has no meaning there."""
 
     points: tuple[tuple[int, int], ...]
@@ -110,37 +110,37 @@ def take_apart(code: bytes, start: int) -> Parts:
 def operand_at(run: ExecutionContext, code: bytes, at: int, place: tuple[int, int]) -> Operand:
     """The target that is at ``place`` of the code, which starts at byte ``at``."""
     start, stop = place
-    begin, end = at + start, at + stop
+    start_at, end = at + start, at + stop
     text = code[start:stop]
     if text.startswith(b"{"):
-        if (literal := plain(run.document.raw, begin, end, 0)) is not None:
-            return Operand(literal, begin, end)
+        if (literal := plain(run.document.raw, start_at, end, 0)) is not None:
+            return Operand(literal, start_at, end)
         close = text.find(b"}")
         if close == len(text) - 1 and b"{" not in text[1:]:
             if b'"' in text:
-                return Operand(UnknownValue("KRL001", "its braces do not match"), begin, end, None, True)
-            target = parse(text, begin, 0, run.value)
+                return Operand(UnknownValue("KRL001", "its braces do not match"), start_at, end, None, True)
+            target = parse(text, start_at, 0, run.value)
             if isinstance(target, UnknownValue) or -1 in target.start:
                 run.mentioned |= identifiers(text)
-            return Operand(target, begin, end, None, isinstance(target, UnknownValue))
+            return Operand(target, start_at, end, None, isinstance(target, UnknownValue))
         if close < 0 or b"{" in text[1:close]:
-            return Operand(UnknownValue("KRL001", "its braces do not match"), begin, end, None, True)
+            return Operand(UnknownValue("KRL001", "its braces do not match"), start_at, end, None, True)
         if text[close + 1 :].lstrip()[:1] not in (b":", b"+", b"-", b"*", b"/"):
             why = f"'{shown(text[close + 1 :])}' is not understood"
-            return Operand(UnknownValue("KRL001", why), begin, end, None, True)
-        return _computed(run, text, begin, end)
+            return Operand(UnknownValue("KRL001", why), start_at, end, None, True)
+        return _computed(run, text, start_at, end)
     named = _take_name(text)
     if named is None:
         if text.startswith(b"("):
-            return _computed(run, text, begin, end)
-        return Operand(UnknownValue("KRL001", "it has no readable target"), begin, end)
+            return _computed(run, text, start_at, end)
+        return Operand(UnknownValue("KRL001", "it has no readable target"), start_at, end)
     rest = named.rest
     if rest[:1] in (b":", b"+", b"-", b"*", b"/", b"(", b"[", b"."):
-        return _computed(run, text, begin, end)
+        return _computed(run, text, start_at, end)
     if rest:
         why = f"'{shown(rest)}' is not understood; it is an inline form without its unfolded lines"
-        return Operand(UnknownValue("KRL001", why), begin, end)
-    return _variable(run, named, begin, end)
+        return Operand(UnknownValue("KRL001", why), start_at, end)
+    return _variable(run, named, start_at, end)
 
 
 class _OperandName(NamedTuple):

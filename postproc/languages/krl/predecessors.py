@@ -53,7 +53,7 @@ def predecessors(rows: MotionRows, continues: Bools) -> dict[int, tuple[int, ...
 
 
 def _few(rows: MotionRows, sources: frozenset[Source], many: set[Source]) -> set[int]:
-    """The rows behind sources, none where they are more than ``MOST``; many: marks that stand for so many, to which
+    """The rows after sources, none where they are more than ``MOST``; many: marks that stand for so many, to which
     those are added that are found to."""
     seen: set[Source] = set()
     found: set[int] = set()
@@ -81,7 +81,7 @@ def _sources_of_others(rows: MotionRows, single: Bools) -> Iterable[Source]:
 
 
 def expanded(rows: MotionRows, sources: Iterable[Source], seen: set[Source] | None = None) -> set[int]:
-    """The rows (and ``START``, ``ELSEWHERE``) among sources, with those behind marks; without what ``seen`` has, which
+    """The rows (and ``START``, ``ELSEWHERE``) among sources, with those after marks; without what ``seen`` has, which
     takes up all that is found."""
     seen = set() if seen is None else seen
     found: set[int] = set()

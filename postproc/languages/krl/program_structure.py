@@ -63,7 +63,7 @@ class ProgramStructure:
     """``events``: index of a statement -> what it opens, branches or closes, in this order of closing.
 
     ``routine_at``: index of the DEF -> routine; ``unclosed``: (line, what) of blocks without an end and ends
-    without a begin; ``assigned``: names that the program assigns as a whole, or with ``.X`` after them a
+    without a start; ``assigned``: names that the program assigns as a whole, or with ``.X`` after them a
     component of; ``read``: names that code reads, other than as the target of a motion; ``table_entries``:
     entries of BASE_DATA and TOOL_DATA that it assigns, None for one whose number is computed; ``later``:
     names that run or change at a time of their own (interrupts, triggers); ``later_effects``: what these

@@ -135,7 +135,7 @@ class RewrittenLines:
 
     @cached_property
     def _forms(self) -> tuple[list[int], list[int]]:
-        """Where the folds of inline forms begin and end."""
+        """Where the folds of inline forms start and end."""
         starts, stops = [], []
         depth = inside = 0
         for found in _FOLD.finditer(self.task.documents[0].raw):

@@ -35,7 +35,7 @@ class Auxiliary(NamedTuple):
     start, stop, file: as in ``Places``, three components; insert, home: as there; operand: its text in document 0.
     variable: None for an aggregate in the line.  text: number of its text, among those of ``Places.text``.
     locked: why its literals must stay as they are, "" where they need not.
-    angle: what is behind CA, None without CA or where its value is not known; has_angle: the line has a CA.
+    angle: what is after CA, None without CA or where its value is not known; has_angle: the line has a CA.
     """
 
     start: tuple[int, int, int]

@@ -155,7 +155,7 @@ def functions_of(statement: Statement) -> tuple[bytes, ...]:
 
 @cached
 def called_in(code: bytes) -> tuple[bytes, ...]:
-    """The names in an expression behind which a bracket opens, upper case."""
+    """The names in an expression after which a bracket opens, upper case."""
     names = dict.fromkeys(name.upper() for name in _FUNCTION.findall(without_strings(code)))
     return tuple(name for name in names if name not in _WORDS)
 

@@ -30,7 +30,7 @@ LOOSE = frozenset(
     b"EXT EXTFCT EXTP IMPORT SIGNAL ENUM STRUC ANOUT ANIN DIGIN INI ASYPTP ASYCONT ASYSTOP ASYCANCEL "
     b"DEFDAT ENDDAT CONST BRAKE TIME_BLOCK".split()
 )
-"""Statements whose words say nothing of the motions of a program, or are looked at elsewhere."""
+"""Statements whose words do not state the motions of a program, or are looked at elsewhere."""
 
 _PLAIN = re.compile(rb"[ \t]*+(?:#[ \t]*+)?+(?:" + NAME + rb"|[-+]?\d{1,15}+(?:\.\d{0,15}+)?+)[ \t]*+\Z")
 _FIELD = re.compile(rb"[ \t]*+" + NAME + rb"(?:[ \t]*+\[[^\[\]]*+\])?+(?=[ \t'\"#{+-])")

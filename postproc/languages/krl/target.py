@@ -199,12 +199,12 @@ def parse(text: bytes, at: int, file: int, evaluate: Evaluate | None = None) -> 
     return found._replace(start=start, stop=stop, insert=found.insert + at)
 
 
-def plain(raw: bytes, begin: int, end: int, file: int) -> KrlTarget | None:
-    """The target in bytes ``begin`` to ``end`` of document ``file``, where all are literals in their usual order, one
-    of X .. C or A1 .. A6 among them; else None."""
-    found = _PLAIN.match(raw, begin, end)
+def plain(raw: bytes, start_at: int, end: int, file: int) -> KrlTarget | None:
+    """The target in bytes ``start_at`` to ``end`` of document ``file``, where all are literals in their usual order,
+    one of X .. C or A1 .. A6 among them; else None."""
+    found = _PLAIN.match(raw, start_at, end)
     if found is None:
-        return _plain_axes(raw, begin, end, file)
+        return _plain_axes(raw, start_at, end, file)
     start, stop = zip(*found.regs[1:7], strict=True)
     insert = max(stop)
     if insert < 0:
@@ -221,8 +221,8 @@ def plain(raw: bytes, begin: int, end: int, file: int) -> KrlTarget | None:
     return KrlTarget(values, start, stop, files, None, status, turn, insert, file, _stated(given[8:]))
 
 
-def _plain_axes(raw: bytes, begin: int, end: int, file: int) -> KrlTarget | None:
-    found = _PLAIN_AXES.match(raw, begin, end)
+def _plain_axes(raw: bytes, start_at: int, end: int, file: int) -> KrlTarget | None:
+    found = _PLAIN_AXES.match(raw, start_at, end)
     if found is None:
         return None
     given = found.groups()
@@ -262,10 +262,10 @@ def _parse(text: bytes, at: int, file: int, evaluate: Evaluate | None) -> KrlTar
         seen.add(key)
         if first < 0:
             first = at + 1 + key_found.start(1)
-        begin = key_found.end()
-        end = value_end(inner, begin) if nested else inner.find(b",", begin)
+        start_at = key_found.end()
+        end = value_end(inner, start_at) if nested else inner.find(b",", start_at)
         end = len(inner) if end < 0 else end
-        literal = inner[begin:end].rstrip(b" \t")
+        literal = inner[start_at:end].rstrip(b" \t")
         value = number(literal) if not key_found[2] else None
         is_literal = value is not None
         if value is None and literal and evaluate is not None and not key_found[2]:
@@ -278,9 +278,9 @@ def _parse(text: bytes, at: int, file: int, evaluate: Evaluate | None) -> KrlTar
         if value is not None and key in COMPONENTS:
             i = COMPONENTS[key]
             values[i] = value
-            insert = at + 1 + begin + len(literal)
+            insert = at + 1 + start_at + len(literal)
             if is_literal:
-                start[i], stop[i] = at + 1 + begin, insert
+                start[i], stop[i] = at + 1 + start_at, insert
         elif value is not None and key in AXES:
             axes[AXES[key]] = value
         elif value is not None and key in states:

@@ -58,7 +58,7 @@ class TargetEdit:
     locked: str
     via: bool = False
 
-    def anew(self) -> list[int]:
+    def moved(self) -> list[int]:
         """The components whose own literal, or expression, gives another value than is wanted."""
         return [
             i
@@ -115,7 +115,7 @@ def _targets(task: KrlWritePlan, rows: Ints, completed: Bools, lines: RewrittenL
             int(places.insert[row]), int(places.home[row]), Span(0, start, stop),
             places.variables.get(row), int(places.text[row]), places.locked.get(row, ""),
         )  # fmt: skip
-        if end.missing or end.anew():
+        if end.missing or end.moved():
             yield end
         if arc is None or not via:
             continue
@@ -123,7 +123,7 @@ def _targets(task: KrlWritePlan, rows: Ints, completed: Bools, lines: RewrittenL
             _change_angle(task, row, arc.angle, bool(kept_angle[k]), lines)
         finer_by = FINER if kept_angle[k] else 0
         auxiliary = _auxiliary(task, row, arc, programmed_vias[row], via, finer_by, texts[3:])
-        if auxiliary.missing or auxiliary.anew():
+        if auxiliary.missing or auxiliary.moved():
             yield auxiliary
 
 
@@ -218,16 +218,16 @@ def _of_one_text(
     edits: list[Edit] = []
     shared = len(targets) > 1 or bool(said)
     for target in targets:
-        anew = target.anew()
-        computed = any(target.start[i] < 0 for i in anew)
+        moved = target.moved()
+        computed = any(target.start[i] < 0 for i in moved)
         why = _why_own(task, target, computed, shared, said)
         if why:
             lines.point(target.row, target.operand, target.variable, target.texts, why, target.via)
             continue
         for i, spot in target.spots():
             if spot not in said:
-                said[spot] = target.wanted[i] if i in anew else target.own[i]
-                if i in anew:
+                said[spot] = target.wanted[i] if i in moved else target.own[i]
+                if i in moved:
                     span = Span(spot[0], spot[1], target.stop[i])
                     edits.append(lines.replaced(span, target.texts[i]))
         if target.missing:

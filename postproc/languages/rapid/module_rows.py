@@ -101,14 +101,14 @@ class ModuleRows:
         return tuple(sorted({self._row(one) for one in expanded(places, set())}))
 
     def starts_of(self, row: int, seen: set[Meeting]) -> list[int]:
-        """The rows among the sources of a row, with those behind meetings that are not in ``seen``."""
+        """The rows among the sources of a row, with those after meetings that are not in ``seen``."""
         at = self.fact_of[row]
         if self.first[at] < row < self.never_from:
             return [row - 1]
         return self.rows_of(self.facts[at].before, seen)
 
     def rows_of(self, sources: Iterable[Source], seen: set[Meeting]) -> list[int]:
-        """The rows among offsets of motions, with those behind meetings that are not in ``seen``."""
+        """The rows among offsets of motions, with those after meetings that are not in ``seen``."""
         return sorted({row for one in expanded(sources, seen) if (row := self._row(one)) >= 0})
 
     def _row(self, source: int) -> int:

@@ -106,7 +106,7 @@ def each_number(text: bytes) -> list[float]:
 
 
 def number_places(text: NDArray[np.uint8], begins: Ints) -> tuple[Ints, Ints]:
-    """Where the first numbers (K, 7) after the places begins (K,) in text (M,) start, and where they end."""
+    """Where the first numbers (K, 7) after the places starts (K,) in text (M,) start, and where they end."""
     inside = _DIGITS[text]
     # an exponent, and its sign, are of the number before
     inside[1:] |= ((text[1:] | 0x20) == ord("e")) & inside[:-1]

@@ -210,7 +210,7 @@ class _PointWriter:
         return b" ".join(words) + b"    ;"
 
     def _numbered(self, lines: dict[int, list[bytes]], edited: bool) -> Iterator[Edit]:
-        """Edits that insert lines, count all lines anew, and keep LINE_COUNT; the mark will be the first line."""
+        """Edits that insert lines, count all lines again, and keep LINE_COUNT; the mark will be the first line."""
         task = self.task
         listing, document = task.places.listing, task.program.documents[0]
         if not lines and not edited:

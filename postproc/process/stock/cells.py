@@ -65,7 +65,7 @@ def build_stock(
 
     The heights are the lowest and highest above its tip at which it may meet stock, inf and -inf where it meets none.
     ``reach`` [m]: distances are known so far at least.  ``slack`` [m]: by so much the sweeps may still be displaced,
-    each by another shift, without being listed anew.
+    each by another shift, without being listed again.
     """
     low, high = corners_of(blank)
     span = high - low
