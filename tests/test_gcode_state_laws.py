@@ -24,7 +24,7 @@ from postproc.languages.gcode.lexing import lex
 from postproc.languages.gcode.modal_fill import FilledRows, everywhere, fill_modal, lookup, switched
 from postproc.languages.gcode.numbered import references
 from postproc.languages.gcode.orientation_words import Angles, Vector, swing
-from postproc.languages.gcode.positions import Course, Trace
+from postproc.languages.gcode.positions import AxisWords, Trace
 from postproc.languages.gcode.refusals import RefusalCollector, RefusalReason
 from postproc.languages.gcode.source import NONE, WordColumn, scan
 from postproc.toolpath import Toolpath
@@ -240,12 +240,12 @@ def test_expressions_in_which_words_are_refused(name: str) -> None:
 # Coordinates
 
 
-def course(random: np.random.Generator, n: int) -> Course:
+def course(random: np.random.Generator, n: int) -> AxisWords:
     kind = random.choice(4, (n, 6), p=[0.4, 0.3, 0.2, 0.1])
     value = np.round(random.normal(0, 1, (n, 6)), 3)
     value[random.random((n, 6)) < 0.05] = NAN
     lost, left = random.random((n, 6)) < 0.06, random.random((n, 6)) < 0.06
-    return Course(np.where(kind > 0, value, 0.0), kind == 1, kind == 2, lost, left)
+    return AxisWords(np.where(kind > 0, value, 0.0), kind == 1, kind == 2, lost, left)
 
 
 def change(block: int, frame: ProgrammedFrame, position: Floats) -> ProgrammedFrame:
@@ -256,7 +256,7 @@ def change(block: int, frame: ProgrammedFrame, position: Floats) -> ProgrammedFr
     return ProgrammedFrame(frame.turn @ turn, position - shift if block % 5 == 0 else shift)
 
 
-def walked(way: Course, events: list[int]) -> tuple[Floats, Floats, Ints, Ints]:
+def walked(way: AxisWords, events: list[int]) -> tuple[Floats, Floats, Ints, Ints]:
     """Before and behind every block, which block told it last, and the frame, one block after the other."""
     n = len(way.value)
     here, origin, frame, number = np.full(6, NAN), np.full(6, -1), ProgrammedFrame(np.eye(3), np.zeros(6)), 0
@@ -298,7 +298,7 @@ def test_coordinates_are_followed_from_block_to_block(seed: int, parts: list[int
     found, begin = [], 0
     for size in parts:
         rows = slice(begin, begin + size)
-        found.append(trace.follow(Course(*(column[rows] for column in vars(way).values())), begin))
+        found.append(trace.follow(AxisWords(*(column[rows] for column in vars(way).values())), begin))
         begin += size
     begins, ends, sources, frames = walked(way, events)
     np.testing.assert_allclose(np.concatenate([part.start for part in found]), begins, atol=1e-12)
@@ -319,7 +319,7 @@ def test_behind_too_many_changes_nothing_is_known(monkeypatch: pytest.MonkeyPatc
         np.arange(1, n),
         lambda *_: ProgrammedFrame(np.eye(3), np.zeros(6)),
     )
-    found = trace.follow(Course(np.ones((n, 6)), all_, none, none, none), 0)
+    found = trace.follow(AxisWords(np.ones((n, 6)), all_, none, none, none), 0)
     assert found.frame.tolist() == [0, 1, 2, 3, 3, 3]
     assert np.isfinite(found.in_base()).all(axis=1).tolist() == [True, True, True, False, False, False]
 

@@ -99,7 +99,7 @@ def test_a_journal_moves_nothing_outside(hot, tmp_path):
         str(hot / "cell.yaml"): str(tmp_path / "c"),
     }
     (hot / ".compensate" / "moves.json").write_text(json.dumps(moves))
-    with HotFolder(hot).held():
+    with HotFolder(hot).exclusive():
         pass
     assert (tmp_path / "secret").exists()
     assert (hot / "cell.yaml").exists()

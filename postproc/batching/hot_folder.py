@@ -41,7 +41,7 @@ Listen = Callable[[Outcome], None]
 
 
 @dataclass
-class _Seen:
+class _FileState:
     """``state``: size and time of a file; ``since``: when it was first seen so (monotonic, s)."""
 
     state: tuple[int, int]
@@ -57,7 +57,7 @@ class HotFolder:
     output: Path | None = None
     options: OptionValues = field(default_factory=dict)
     settle: float = 2.0
-    _seen: dict[Path, _Seen] = field(default_factory=dict)
+    _file_states: dict[Path, _FileState] = field(default_factory=dict)
     _waits: dict[Path, tuple[int, int]] = field(default_factory=dict)
 
     @property
@@ -66,7 +66,7 @@ class HotFolder:
         return self.folder / FOLDER if self.output is None else self.output
 
     @contextlib.contextmanager
-    def held(self, waits: Callable[[], None] = lambda: None) -> Iterator[None]:
+    def exclusive(self, waits: Callable[[], None] = lambda: None) -> Iterator[None]:
         """Keeps other watchers out of the folder; what an earlier one had started to move is moved.  ``waits`` is
         called where another one watches it.  Raises Refusal FIL004 where the folder takes no file."""
         with locked(self.folder / STATE / "watch.lock", waits):
@@ -96,15 +96,15 @@ class HotFolder:
             group = self._group(path)
             states = {member: _state(member) for member in group}
             for member, state in states.items():
-                seen = self._seen.get(member)
+                seen = self._file_states.get(member)
                 if state is None or seen is None or seen.state != state:
-                    self._seen[member] = _Seen(state or (-1, -1), now)
-            settled = all(now - self._seen[member].since >= self.settle for member in group)
+                    self._file_states[member] = _FileState(state or (-1, -1), now)
+            settled = all(now - self._file_states[member].since >= self.settle for member in group)
             own = states[path]
             if settled and own is not None and self._waits.get(path) != own:
                 yield path
         known = {member for path in programs for member in self._group(path)}
-        self._seen = {path: seen for path, seen in self._seen.items() if path in known}
+        self._file_states = {path: seen for path, seen in self._file_states.items() if path in known}
 
     def _group(self, program: Path) -> list[Path]:
         """The program and what lies beside it under its name."""

@@ -33,7 +33,7 @@ def locked(path: Path, waits: Callable[[], None] = lambda: None) -> Iterator[Non
         yield
 
 
-def _acquire(path: Path, waits: Callable[[], None], held: contextlib.ExitStack) -> None:
+def _acquire(path: Path, waits: Callable[[], None], stack: contextlib.ExitStack) -> None:
     for races in range(RACES + 1):
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -42,7 +42,7 @@ def _acquire(path: Path, waits: Callable[[], None], held: contextlib.ExitStack) 
             with contextlib.ExitStack() as own:
                 own.callback(_remove_empty, path.parent)
                 own.enter_context(lock_file(path, waits))
-                held.push(own.pop_all())
+                stack.push(own.pop_all())
             return
         except (FileNotFoundError, FileExistsError):  # the last holder took the folders away just now
             if races == RACES:

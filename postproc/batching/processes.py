@@ -68,7 +68,7 @@ def run_here(
                         waiting.append(number)
                         continue
                     answer = died(
-                        tasks[number], f"its process ended with {worker.ending()}, {ATTEMPTS} times"
+                        tasks[number], f"its process ended with {worker.end_reason()}, {ATTEMPTS} times"
                     )
                 worker.number = None
                 yield number, answer
@@ -115,7 +115,7 @@ class _Worker:
             return None
         return message
 
-    def ending(self) -> str:
+    def end_reason(self) -> str:
         self.process.join()
         code = self.process.exitcode or 0
         return signal.Signals(-code).name if code < 0 else f"code {code}"

@@ -114,7 +114,7 @@ def watch(
     with (
         out.refusals(),
         _interruptible(),
-        hot.held(lambda: click.echo("another run watches this folder", err=True)),
+        hot.exclusive(lambda: click.echo("another run watches this folder", err=True)),
     ):
         if not out.quiet:
             click.echo(f"watching {folder}; results go to {hot.results}", err=True)

@@ -73,7 +73,7 @@ class _FittedRamps:
 
 
 @dataclass(frozen=True)
-class _Found:
+class _FittedPoints:
     """Points of one ramp: places (n, 3), path lengths (n,) [m] from the vertex, and which of them is the motion that is
     there already."""
 
@@ -96,7 +96,7 @@ def choose_ramp_points(
         return division, None
     curves = _curves(task, division, ramps)
     spare = limits.inserted(len(task.toolpath)) - division.inserted
-    found: dict[int, _Found] = {}
+    found: dict[int, _FittedPoints] = {}
     left = np.arange(len(ramps.row))
     for count in range(1, len(_STARTS) + 1):
         some = left[(fewest[left] <= count) & (count <= inner[left] + spare)]
@@ -284,9 +284,9 @@ def _exact_starts(ramps: _FittedRamps, count: int) -> tuple[Floats, Ints]:
 
 def _fitted(
     ramps: _FittedRamps, curves: Curves, count: int, allowed: float, names: Ints
-) -> dict[int, _Found]:
+) -> dict[int, _FittedPoints]:
     """Of the ramps that ``count`` inserted points can follow, their points by ``names`` (G,)."""
-    found: dict[int, _Found] = {}
+    found: dict[int, _FittedPoints] = {}
     for exact in (False, True):
         some = np.flatnonzero(ramps.exact == exact)
         if not len(some):
@@ -305,7 +305,7 @@ def _fitted(
             along = curve.nearest(points, parameter)[:, 1:-1]
             good = largest <= allowed
             for k in np.flatnonzero(good).tolist():
-                found[int(names[some[left[k]]])] = _Found(points[k, 1:-1], along[k], place)
+                found[int(names[some[left[k]]])] = _FittedPoints(points[k, 1:-1], along[k], place)
             left = left[~good]
             if not len(left):
                 break
@@ -313,18 +313,18 @@ def _fitted(
 
 
 def _without_points(
-    task: CompensationProblem, division: Subdivision, ramps: _FittedRamps, found: dict[int, _Found]
+    task: CompensationProblem, division: Subdivision, ramps: _FittedRamps, fitted: dict[int, _FittedPoints]
 ) -> tuple[Subdivision, ChosenPoints | None]:
-    """The division without the points of the ramps that were ``found``, but one of those after exact vertices; and
+    """The division without the points of the ramps that were ``fitted``, but one of those after exact vertices; and
     what is inserted instead."""
-    if not found:
+    if not fitted:
         return division, None
-    names = np.array(sorted(found), np.int64)
+    names = np.array(sorted(fitted), np.int64)
     length = task.desired_path.length
     dropped, own, group, row, share, place, moved = [], [], [], [], [], [], []
     inserted = np.flatnonzero((division.role == Role.INTERMEDIATE) & (division.share < 1.0))
     for number, name in enumerate(names.tolist()):
-        ramp, points = ramps[np.array([name])], found[name]
+        ramp, points = ramps[np.array([name])], fitted[name]
         here = int(ramp.row[0])
         mine = inserted[division.source[inserted] == here]
         last = ramp.end[0] + 2.0 * ramp.spacing[0]

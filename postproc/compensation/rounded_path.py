@@ -175,15 +175,17 @@ class RoundedOutput:
         return np.stack([row[near], share[near]], axis=1)
 
     def _where_force_turns(
-        self, at: Ints, share: Floats, found: Deviations
+        self, at: Ints, share: Floats, deviations: Deviations
     ) -> Iterator[tuple[Floats, Floats]]:
         """Errors (K,) [m] and (K,) [rad] where the tool is at the ``turns`` of the force: between the two of the shares
-        (K, S) of the segments ``at`` (K, S) beside each, of which the places are ``found`` (K S)."""
-        low = int(min(found.row.min(), self.turns[:, 0].min()))
-        high = int(max(found.row.max(), self.turns[:, 0].max()))
+        (K, S) of the segments ``at`` (K, S) beside each, of which the places are ``deviations`` (K S)."""
+        low = int(min(deviations.row.min(), self.turns[:, 0].min()))
+        high = int(max(deviations.row.max(), self.turns[:, 0].max()))
         length = self.task.desired_path.length[low : high + 1]
         begins = np.concatenate([[0.0], np.cumsum(length)])
-        place = (begins[found.row - low] + found.share * length[found.row - low]).reshape(at.shape)
+        place = (begins[deviations.row - low] + deviations.share * length[deviations.row - low]).reshape(
+            at.shape
+        )
         row = self.turns[:, 0].astype(np.int64) - low
         turns = np.unique(begins[row] + self.turns[:, 1] * length[row])
         passed = np.searchsorted(turns, place)

@@ -103,7 +103,7 @@ class Candidate:
 def candidates(
     campaign: Campaign,
     model: StiffnessModel,
-    given: Nuisances,
+    nuisances: Nuisances,
     by_direction: bool = False,
     near: Point | None = None,
 ) -> tuple[Candidate, ...]:
@@ -123,10 +123,10 @@ def candidates(
             missing = [
                 u for u in unknowns_of(model, term) if u.stated is None and u.value == u.parameter.null
             ]
-            entries += _by_joint(campaign, model, given, [u for u in missing if not u.fixed], near)
+            entries += _by_joint(campaign, model, nuisances, [u for u in missing if not u.fixed], near)
         for wider in () if known else _widened(model, effect):
             unknowns = [u for u in unknowns_of(wider, len(model.terms)) if not u.fixed]
-            entries += _by_joint(campaign, wider, given, unknowns, near)
+            entries += _by_joint(campaign, wider, nuisances, unknowns, near)
     return tuple(entries)
 
 
@@ -140,7 +140,7 @@ def _widened(model: StiffnessModel, effect: type[Effect]) -> list[StiffnessModel
 def _by_joint(
     campaign: Campaign,
     model: StiffnessModel,
-    given: Nuisances,
+    nuisances: Nuisances,
     unknowns: Sequence[Unknown],
     near: Point | None,
 ) -> list[Candidate]:
@@ -149,16 +149,16 @@ def _by_joint(
         return []
     effect = model.terms[unknowns[0].term].effect
     here = campaign.predicted(model) if near is None else predicted_in(model, near)
-    moves = np.nan_to_num(columns(campaign, model, unknowns, here, given))
+    moves = np.nan_to_num(columns(campaign, model, unknowns, here, nuisances))
     sized = model.with_values({u.key: u.parameter.null + u.parameter.scale for u in unknowns})
     there = campaign.predicted(sized, here.displacement)
     still = np.asarray(~moves.any(axis=(0, 1)))
     nonlinear = _is_nonlinear(
-        campaign.residual(here, given) - campaign.residual(there, given), moves.sum(axis=2)
+        campaign.residual(here, nuisances) - campaign.residual(there, nuisances), moves.sum(axis=2)
     )
     if still.any() and nonlinear:
         # a parameter may show only where others have a size: a length where the spring has a stiffness
-        moves[:, :, still] = np.nan_to_num(columns(campaign, sized, unknowns, there, given))[:, :, still]
+        moves[:, :, still] = np.nan_to_num(columns(campaign, sized, unknowns, there, nuisances))[:, :, still]
     dormant = frozenset(
         u.parameter.name for u, rests in zip(unknowns, still.tolist(), strict=True) if rests and nonlinear
     )

@@ -40,24 +40,24 @@ SHOWS = 4.5
 of 1 to 100,000 by chance, one to a thousand among a hundred candidates."""
 
 
-def cover_equivalent_models(found: Fit, full: Fit, base: Fit, named: Sequence[Candidate]) -> Fit:
-    """``found`` with intervals that hold what these readings do not tell from it.
+def cover_equivalent_models(fitted: Fit, full: Fit, base: Fit, named: Sequence[Candidate]) -> Fit:
+    """``fitted`` with intervals that hold what these readings do not tell from it.
 
     That is what ``full``, the fit of all parameters, and ``base`` left out because it is observable too weakly; and as
     far as none would show in its plausible size, what the ``named`` effects have beside what was fitted, and lengths,
     twists and zeros that nothing states.
     """
     if not full.unknowns:
-        return found
+        return fitted
     model, others = _not_estimated(full, base, named)
     covariance, mean = _posterior(full, model, others)
     places = {u.key: k for k, u in enumerate(full.unknowns)}
-    here = [k for k, u in enumerate(found.unknowns) if u.key in places]
-    there = [places[found.unknowns[k].key] for k in here]
-    away = (found.point.values(found.unknowns)[here] - mean[there])[:, None]
-    wider = found.covariance.copy()
+    here = [k for k, u in enumerate(fitted.unknowns) if u.key in places]
+    there = [places[fitted.unknowns[k].key] for k in here]
+    away = (fitted.point.values(fitted.unknowns)[here] - mean[there])[:, None]
+    wider = fitted.covariance.copy()
     wider[np.ix_(here, here)] = covariance[np.ix_(there, there)] + away @ away.T
-    return replace(found, covariance=wider)
+    return replace(fitted, covariance=wider)
 
 
 def _not_estimated(

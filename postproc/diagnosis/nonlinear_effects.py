@@ -60,14 +60,14 @@ def evaluate_at_size(
     high = (np.array([u.parameter.upper for u in unknowns]) - null) / scale
     target = outside(point.residual[:, :, None])[:, 0]
 
-    def taken(x: Floats, start: Floats) -> tuple[Point, Floats]:
+    def evaluate(x: Floats, start: Floats) -> tuple[Point, Floats]:
         values = {u.key: v for u, v in zip(unknowns, (null + x * scale).tolist(), strict=True)}
         there = at(campaign, model.with_values(values), point.nuisances, start, ROUGH)
         does = np.nan_to_num(point.residual - there.residual)
         return there, does
 
     x = np.clip(np.ones(len(unknowns)), low, high)
-    there, does = taken(x, displacement_in(model, point))
+    there, does = evaluate(x, displacement_in(model, point))
     remaining = target - outside(does[:, :, None])[:, 0]
     for _ in range(STEPS):
         there = with_columns(campaign, there, unknowns)
@@ -75,7 +75,7 @@ def evaluate_at_size(
         step, before = _step(matrix, remaining, low - x, high - x), remaining @ remaining
         for _ in range(6):
             trial = np.clip(x + step, low, high)
-            moved, did = taken(trial, there.predicted.displacement)
+            moved, did = evaluate(trial, there.predicted.displacement)
             rest = target - outside(did[:, :, None])[:, 0]
             if rest @ rest < before:
                 break

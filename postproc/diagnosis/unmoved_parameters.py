@@ -53,13 +53,13 @@ def restore_unmoved_parameters(fitted: Fit) -> Fit:
     return replace(found, covariance=_covariance(found, fitted))
 
 
-def _covariance(found: Fit, fitted: Fit) -> Floats:
-    """(k, k) of what was ``found``, as of ``fitted``: that a parameter is not asked for does not make it exact, and
+def _covariance(refitted: Fit, fitted: Fit) -> Floats:
+    """(k, k) of what was ``refitted``, as of ``fitted``: that a parameter is not asked for does not make it exact, and
     what it may be is in the intervals of the others."""
     places = {u.key: k for k, u in enumerate(fitted.unknowns)}
-    here = [k for k, u in enumerate(found.unknowns) if u.key in places]
-    there = [places[found.unknowns[k].key] for k in here]
-    covariance = np.diag(np.diag(found.covariance))
+    here = [k for k, u in enumerate(refitted.unknowns) if u.key in places]
+    there = [places[refitted.unknowns[k].key] for k in here]
+    covariance = np.diag(np.diag(refitted.covariance))
     covariance[np.ix_(here, here)] = fitted.covariance[np.ix_(there, there)]
     return covariance
 

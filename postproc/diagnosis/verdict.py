@@ -190,7 +190,7 @@ def judge(search: Search) -> Verdict:
         kept = list(range(len(named)))
         while kept:
             alone, _ = reduced_chi2_of(search, explained(linear.problem, [groups[k] for k in kept]))
-            taken = _taken(alone, bare, linear.problem.known)
+            taken = _explained_share(alone, bare, linear.problem.known)
             still = [k for k in kept if taken >= EVERY_ARM.get(named[k].effect, rare)]
             if still == kept:
                 break
@@ -226,7 +226,7 @@ def judge(search: Search) -> Verdict:
     )
 
 
-def _taken(variance: float, bare: float, known: bool) -> float:
+def _explained_share(variance: float, bare: float, known: bool) -> float:
     """Share of the variance beyond scatter that is explained; of one that is not known, of all."""
     floor = 1.0 if known else 0.0
     return 1.0 - (variance - floor) / (bare - floor) if bare > floor else 1.0

@@ -147,16 +147,16 @@ def spacings(robot: Robot, spacing: float) -> Floats:
     return np.array([spacing * (1.0 if joint.kind == "revolute" else SLIDING_DEG) for joint in robot.joints])
 
 
-def spreads(offer: CandidateSetups) -> Floats | None:
+def spreads(candidates: CandidateSetups) -> Floats | None:
     """(n,) [rad, m] of each axis, whose shares sum up to 1 where two poses differ by ``offer.spread``; None without."""
-    ranges = offer.limits[:, 1] - offer.limits[:, 0]
+    ranges = candidates.limits[:, 1] - candidates.limits[:, 0]
     moves = ranges > 0
-    if not offer.spread or not moves.any():
+    if not candidates.spread or not moves.any():
         return None
-    return np.where(moves, offer.spread * moves.sum() * ranges, np.inf)
+    return np.where(moves, candidates.spread * moves.sum() * ranges, np.inf)
 
 
-def drawn(model: StiffnessModel, offer: CandidateSetups, count: int, rng: np.random.Generator) -> Setups:
+def drawn(model: StiffnessModel, candidates: CandidateSetups, count: int, rng: np.random.Generator) -> Setups:
     """``count`` random poses that can be set up and seen, or as many as are found; each with all of its loads, or once
     with each.
 
@@ -165,9 +165,9 @@ def drawn(model: StiffnessModel, offer: CandidateSetups, count: int, rng: np.ran
     batches: list[Floats] = []
     inside = total = have = 0
     for _ in range(TRIES):
-        low, high = offer.limits.T
-        q = _rounded(model.robot, offer, rng.uniform(low, high, (BATCH, len(low))))
-        roomy, visible = _allowed(model, offer, q)
+        low, high = candidates.limits.T
+        q = _rounded(model.robot, candidates, rng.uniform(low, high, (BATCH, len(low))))
+        roomy, visible = _allowed(model, candidates, q)
         usable = roomy & visible.any(axis=1)
         total, inside, have = total + BATCH, inside + int(roomy.sum()), have + int(usable.sum())
         batches.append(q[usable])
@@ -191,22 +191,22 @@ def drawn(model: StiffnessModel, offer: CandidateSetups, count: int, rng: np.ran
     direction = None
     if any(term.effect.by_direction for term in model.terms):
         direction = rng.choice([-1.0, 1.0], q.shape)
-    visible = _allowed(model, offer, q)[1]
-    if not len(offer.pulls) and (offer.each_load or len(offer.loads) == 1):
-        return Setups(q, np.tile(offer.loads, (len(q), 1)), visible, direction)
+    visible = _allowed(model, candidates, q)[1]
+    if not len(candidates.pulls) and (candidates.each_load or len(candidates.loads) == 1):
+        return Setups(q, np.tile(candidates.loads, (len(q), 1)), visible, direction)
     once = Setups(q, np.zeros((len(q), 1)), visible, direction)
-    choices = len(offer.loads) + len(offer.pulls)
+    choices = len(candidates.loads) + len(candidates.pulls)
     rows = np.repeat(np.arange(len(q)), choices)
-    load = np.tile(np.append(offer.loads, np.zeros(len(offer.pulls))), len(q))[:, None]
-    if not len(offer.pulls):
+    load = np.tile(np.append(candidates.loads, np.zeros(len(candidates.pulls))), len(q))[:, None]
+    if not len(candidates.pulls):
         return replace(once[rows], load=load)
-    pull = np.concatenate([np.zeros((len(offer.loads), 3)), offer.pulls])
+    pull = np.concatenate([np.zeros((len(candidates.loads), 3)), candidates.pulls])
     return replace(once[rows], load=load, pull=np.tile(pull, (len(q), 1)))
 
 
 def around(
     model: StiffnessModel,
-    offer: CandidateSetups,
+    candidates: CandidateSetups,
     setups: Setups,
     share: float,
     copies: int,
@@ -215,43 +215,46 @@ def around(
     """Poses near those of ``setups``, ``copies`` of each as far as they are allowed: every other axis moved by some
     ``share`` of its range."""
     parents = np.repeat(np.arange(len(setups)), copies)
-    span = offer.limits[:, 1] - offer.limits[:, 0]
+    span = candidates.limits[:, 1] - candidates.limits[:, 0]
     step = (
         rng.normal(0.0, share, (len(parents), len(span)))
         * span
         * rng.integers(0, 2, (len(parents), len(span)))
     )
-    q = _rounded(model.robot, offer, setups.q[parents] + step)
-    roomy, visible = _allowed(model, offer, q)
+    q = _rounded(model.robot, candidates, setups.q[parents] + step)
+    roomy, visible = _allowed(model, candidates, q)
     usable = roomy & visible.any(axis=1)
     return replace(setups[parents[usable]], q=q[usable], visible=visible[usable])
 
 
-def _rounded(robot: Robot, offer: CandidateSetups, q: Floats) -> Floats:
+def _rounded(robot: Robot, candidates: CandidateSetups, q: Floats) -> Floats:
     """The axes in whole steps, within the limits."""
     step = steps(robot)
-    low, high = np.ceil(offer.limits[:, 0] / step - 1e-9), np.floor(offer.limits[:, 1] / step + 1e-9)
+    low, high = (
+        np.ceil(candidates.limits[:, 0] / step - 1e-9),
+        np.floor(candidates.limits[:, 1] / step + 1e-9),
+    )
     return np.asarray(np.clip(np.round(q / step), low, np.maximum(low, high)) * step)
 
 
-def _allowed(model: StiffnessModel, offer: CandidateSetups, q: Floats) -> tuple[Bools, Bools]:
+def _allowed(model: StiffnessModel, candidates: CandidateSetups, q: Floats) -> tuple[Bools, Bools]:
     """(N,) whether the carried points are inside the box; (N, T) whether the tracker sees the targets."""
     flange = model.chain.flange(q)
-    points = np.concatenate([np.zeros((1, 3)), offer.tool.position[None], offer.places])
+    points = np.concatenate([np.zeros((1, 3)), candidates.tool.position[None], candidates.places])
     at = flange.position[:, None] + np.einsum("nij,tj->nti", flange.rotation, points)
-    inside = ((at >= offer.box[:, 0]) & (at <= offer.box[:, 1])).all(axis=(1, 2))
-    if offer.tracker is None:
-        return inside, np.ones((len(q), len(offer.places)), bool)
-    sight = offer.tracker - at[:, 2:]
-    faces = np.einsum("nij,tj->nti", flange.rotation, offer.facing)
+    inside = ((at >= candidates.box[:, 0]) & (at <= candidates.box[:, 1])).all(axis=(1, 2))
+    if candidates.tracker is None:
+        return inside, np.ones((len(q), len(candidates.places)), bool)
+    sight = candidates.tracker - at[:, 2:]
+    faces = np.einsum("nij,tj->nti", flange.rotation, candidates.facing)
     cosine = (faces * sight).sum(axis=2) / np.maximum(np.linalg.norm(sight, axis=2), 1e-12)
-    return inside, cosine >= np.cos(offer.cone)
+    return inside, cosine >= np.cos(candidates.cone)
 
 
-def readings_of(model: StiffnessModel, offer: CandidateSetups, setups: Setups) -> Readings:
+def readings_of(model: StiffnessModel, candidates: CandidateSetups, setups: Setups) -> Readings:
     """The readings of all targets under all loads at every pose, in this order; also of targets out of sight."""
     robot = model.robot
-    count, loads, targets = len(setups), setups.load.shape[1], len(offer.places)
+    count, loads, targets = len(setups), setups.load.shape[1], len(candidates.places)
     row = np.repeat(np.arange(count), loads * targets)
     load = np.repeat(setups.load.reshape(-1), targets)
     wrench = np.zeros((len(row), 6))
@@ -262,12 +265,12 @@ def readings_of(model: StiffnessModel, offer: CandidateSetups, setups: Setups) -
         [(joint.name, joint.kind != "revolute") for joint in robot.joints],
         setups.q[row],
         wrench,
-        offer.deflection,
+        candidates.deflection,
         robot=robot.name,
-        tool=offer.tool,
-        targets=offer.targets,
-        places={} if offer.rough else dict(zip(offer.targets, offer.places, strict=False)),
+        tool=candidates.tool,
+        targets=candidates.targets,
+        places={} if candidates.rough else dict(zip(candidates.targets, candidates.places, strict=False)),
         target=np.tile(np.arange(targets), count * loads),
-        sigma=offer.sigma,
+        sigma=candidates.sigma,
     )
     return readings if setups.direction is None else replace(readings, direction=setups.direction[row])

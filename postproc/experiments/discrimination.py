@@ -111,7 +111,7 @@ def apart(
     first: Sequence[Unknown],
     second: Sequence[Unknown],
     common: Sequence[Unknown],
-    offer: CandidateSetups,
+    candidate_setups: CandidateSetups,
     sizes: Iterable[int],
     seed: int = 1,
     candidates: int = CANDIDATES,
@@ -127,15 +127,18 @@ def apart(
     """
     rng = np.random.default_rng(seed)
     stage("looking for poses")
-    setups = drawn(model, offer, candidates, rng)
+    setups = drawn(model, candidate_setups, candidates, rng)
     one, two, both = ([u for u in unknowns if u.prior is None] for unknowns in (first, second, common))
-    spacing, spread = spacings(model.robot, offer.spacing), spreads(offer)
+    spacing, spread = spacings(model.robot, candidate_setups.spacing), spreads(candidate_setups)
     widths = [_patterns(model, one), _patterns(model, two), len(one), len(two)]
     separation: dict[int, tuple[float, float]] = {}
 
     def evaluated(some: Setups) -> Pool:
-        alternatives = _alternative(model, one, two, offer, some), _alternative(model, two, one, offer, some)
-        fitted = observability(model, both, offer, some)
+        alternatives = (
+            _alternative(model, one, two, candidate_setups, some),
+            _alternative(model, two, one, candidate_setups, some),
+        )
+        fitted = observability(model, both, candidate_setups, some)
         parts = [alternative.pattern for alternative in alternatives] + [
             alternative.columns for alternative in alternatives
         ]
@@ -157,9 +160,9 @@ def apart(
 
     stage("computing what poses show")
     start = rested(model, setups, evaluated)
-    pool, chosen = refined(model, offer, start, evaluated, chosen_from, rng, stage)
+    pool, chosen = refined(model, candidate_setups, start, evaluated, chosen_from, rng, stage)
     for size, rows in chosen.items():
-        enough(model, offer, size, len(rows))
+        enough(model, candidate_setups, size, len(rows))
     return Discrimination(
         len(start), {size: pool.setups[list(rows)] for size, rows in chosen.items()}, separation
     )
@@ -178,16 +181,16 @@ def _alternative(
     model: StiffnessModel,
     own: Sequence[Unknown],
     other: Sequence[Unknown],
-    offer: CandidateSetups,
+    candidates: CandidateSetups,
     setups: Setups,
 ) -> CompetingModel:
     """One explanation, in a model without the other."""
     without = model.with_values({u.key: u.parameter.null for u in other})
     if not _has_values(model, own):
         columns = observability(
-            without.with_values({u.key: u.parameter.scale for u in own}), own, offer, setups
+            without.with_values({u.key: u.parameter.scale for u in own}), own, candidates, setups
         ).columns
         return CompetingModel(columns, columns)
     bare = without.with_values({u.key: u.parameter.null for u in own})
-    pattern = expected(without, offer, setups) - expected(bare, offer, setups)
-    return CompetingModel(pattern[:, :, None], observability(without, own, offer, setups).columns)
+    pattern = expected(without, candidates, setups) - expected(bare, candidates, setups)
+    return CompetingModel(pattern[:, :, None], observability(without, own, candidates, setups).columns)

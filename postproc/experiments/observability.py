@@ -47,12 +47,12 @@ class Observability:
 
 
 def observability(
-    model: StiffnessModel, unknowns: Sequence[Unknown], offer: CandidateSetups, setups: Setups
+    model: StiffnessModel, unknowns: Sequence[Unknown], candidates: CandidateSetups, setups: Setups
 ) -> Observability:
     """What ``setups`` show under ``model``; NaN where it has no equilibrium."""
-    campaign = Campaign(readings_of(model, offer, setups))
-    predicted, given = campaign.predicted(model), _placed(campaign, offer)
-    weight = _weights(offer, setups)[:, :, None]
+    campaign = Campaign(readings_of(model, candidates, setups))
+    predicted, given = campaign.predicted(model), _placed(campaign, candidates)
+    weight = _weights(candidates, setups)[:, :, None]
     derivatives = columns(campaign, model, unknowns, predicted, given)
     nuisance = campaign.nuisance_columns(predicted, given)
     return Observability(
@@ -62,25 +62,29 @@ def observability(
     )
 
 
-def expected(model: StiffnessModel, offer: CandidateSetups, setups: Setups) -> Floats:
+def expected(model: StiffnessModel, candidates: CandidateSetups, setups: Setups) -> Floats:
     """(C, r) whitened, what the readings of ``setups`` would be; NaN where the model has no equilibrium."""
-    campaign = Campaign(readings_of(model, offer, setups))
-    weight = _weights(offer, setups)
+    campaign = Campaign(readings_of(model, candidates, setups))
+    weight = _weights(candidates, setups)
     return (
-        campaign.expected(campaign.predicted(model), _placed(campaign, offer))[0].reshape(weight.shape)
+        campaign.expected(campaign.predicted(model), _placed(campaign, candidates))[0].reshape(weight.shape)
         * weight
     )
 
 
-def _placed(campaign: Campaign, offer: CandidateSetups) -> Nuisances:
+def _placed(campaign: Campaign, candidates: CandidateSetups) -> Nuisances:
     """Tracker in the robot base, targets where they are about."""
-    given, into = campaign.start(), offer.tool.inverse()
-    return replace(given, places=offer.places @ into.rotation.T + into.position) if offer.targets else given
+    given, into = campaign.start(), candidates.tool.inverse()
+    return (
+        replace(given, places=candidates.places @ into.rotation.T + into.position)
+        if candidates.targets
+        else given
+    )
 
 
-def _weights(offer: CandidateSetups, setups: Setups) -> Floats:
+def _weights(candidates: CandidateSetups, setups: Setups) -> Floats:
     """(C, r) 1 / sigma of each coordinate, 0 of targets out of sight."""
-    return np.repeat(np.tile(setups.visible, (1, setups.load.shape[1])), 3, axis=1) / offer.sigma
+    return np.repeat(np.tile(setups.visible, (1, setups.load.shape[1])), 3, axis=1) / candidates.sigma
 
 
 def measured(
@@ -100,11 +104,14 @@ def measured(
 
 
 def influential(
-    model: StiffnessModel, unknowns: Sequence[Unknown], offer: CandidateSetups, setups: Setups
+    model: StiffnessModel, unknowns: Sequence[Unknown], candidates: CandidateSetups, setups: Setups
 ) -> StiffnessModel:
     """The model with the effects that move nothing where they are at the sizes of their parameters: a fit starts
     there too."""
-    still = np.nan_to_num(np.abs(observability(model, unknowns, offer, setups).columns)).max(axis=(0, 1)) == 0
+    still = (
+        np.nan_to_num(np.abs(observability(model, unknowns, candidates, setups).columns)).max(axis=(0, 1))
+        == 0
+    )
     dormant = {
         unknown.key: unknown.parameter.scale
         for unknown in unknowns
@@ -114,9 +121,9 @@ def influential(
     if not dormant:
         return model
     moves = np.nan_to_num(
-        np.abs(observability(model.with_values(dormant), unknowns, offer, setups).columns)
+        np.abs(observability(model.with_values(dormant), unknowns, candidates, setups).columns)
     ).max(axis=(0, 1))
-    wakes = {unknown.term for i, unknown in enumerate(unknowns) if moves[i] * offer.sigma > MOVES}
+    wakes = {unknown.term for i, unknown in enumerate(unknowns) if moves[i] * candidates.sigma > MOVES}
     woken = {key: value for key, value in dormant.items() if key[0] in wakes}
     return model.with_values(woken) if woken else model
 

@@ -69,11 +69,11 @@ def rested(model: StiffnessModel, setups: Setups, evaluated: Evaluated) -> Pool:
     return pool
 
 
-def enough(model: StiffnessModel, offer: CandidateSetups, wanted: int, count: int) -> None:
+def enough(model: StiffnessModel, candidates: CandidateSetups, wanted: int, count: int) -> None:
     """Raises Refusal PLN004 where fewer distinct poses than wanted were found."""
     if count < wanted:
         message = (
-            f"{count} poses differ by {offer.spacing / DEG:g} deg in one axis at least, and"
+            f"{count} poses differ by {candidates.spacing / DEG:g} deg in one axis at least, and"
             f" {wanted} are requested"
         )
         raise Refusal(Finding("PLN004", message, str(model.robot.path)))
@@ -81,7 +81,7 @@ def enough(model: StiffnessModel, offer: CandidateSetups, wanted: int, count: in
 
 def refined(
     model: StiffnessModel,
-    offer: CandidateSetups,
+    candidates: CandidateSetups,
     start: Pool,
     evaluated: Evaluated,
     chosen_from: Callable[[Pool, Choice], Choice],
@@ -97,7 +97,7 @@ def refined(
         used = sorted({row for rows in chosen.values() for row in rows})
         best = pool[used]
         place = {row: len(start) + i for i, row in enumerate(used)}
-        near = around(model, offer, best.setups, share, max(2, NEARBY // len(used)), rng)
+        near = around(model, candidates, best.setups, share, max(2, NEARBY // len(used)), rng)
         pool = start + best + evaluated(near) if len(near) else start + best
         chosen = chosen_from(pool, {size: [place[row] for row in rows] for size, rows in chosen.items()})
     return pool, chosen

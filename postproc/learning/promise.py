@@ -43,7 +43,7 @@ def promise(result: Attribution, last: Bools, gain: float = 1.0) -> Promise:
     """What remains on a part like those at the points ``last`` (K,), the part that was cut last, if ``gain`` of all
     that was learnt is applied."""
     own = np.flatnonzero(last[result.kept])
-    rows, taken = result.kept_rows[own], _taken(result.layout.free[result.kept_rows[own]])
+    rows, taken = result.kept_rows[own], _alignment_basis(result.layout.free[result.kept_rows[own]])
     variance = (
         held_out_variance(result.explained, own, taken) + (SCATTER * result.explained.by_force[own]) ** 2
     )
@@ -52,17 +52,17 @@ def promise(result: Attribution, last: Bools, gain: float = 1.0) -> Promise:
     return Promise(measured_rms(result, last), after, LOWER * after, UPPER * after)
 
 
-def held_out_variance(explained: Explanation, own: Ints, taken: Floats) -> Floats:
+def held_out_variance(explained: Explanation, own: Ints, basis: Floats) -> Floats:
     """(J,) [m2] of causes and field at the points ``own`` (J,), each without its own measurement, after the alignment
-    of all J by the orthonormal columns ``taken`` (J, A)."""
+    of all J by the orthonormal columns ``basis`` (J, A)."""
     prior = explained.columns @ explained.columns.T + explained.layout.field(explained.surface)
     follows = prior @ explained.inverse
 
     def aligned(whole: Floats) -> Floats:
-        return whole - taken @ (taken.T @ whole)
+        return whole - basis @ (basis.T @ whole)
 
     remains = aligned((prior - follows @ prior)[np.ix_(own, own)])
-    remains = remains - (remains @ taken) @ taken.T
+    remains = remains - (remains @ basis) @ basis.T
     itself = np.diag(aligned(follows[np.ix_(own, own)])) ** 2 / np.diag(explained.inverse)[own]
     return np.asarray(np.maximum(np.diag(remains), 0.0) + itself)
 
@@ -74,15 +74,15 @@ def measured_rms(result: Attribution, of: Bools) -> float:
     if not len(own):
         return 0.0
     layout = result.explained.layout
-    aligned = _aligned(result.deviation[result.kept_rows[own]], _taken(layout.free[own]))
+    aligned = _aligned(result.deviation[result.kept_rows[own]], _alignment_basis(layout.free[own]))
     return float(np.sqrt(max(float(np.mean(aligned**2)) - float(np.mean(layout.sigma[own] ** 2)), 0.0)))
 
 
-def _taken(free: Floats) -> Floats:
+def _alignment_basis(free: Floats) -> Floats:
     """(J, A) orthonormal columns of the freedoms (J, A) that the alignment of these points takes out."""
     own = free[:, np.abs(free).any(axis=0)]
     return np.linalg.qr(own)[0] if own.shape[1] else np.zeros((len(free), 0))
 
 
-def _aligned(values: Floats, taken: Floats) -> Floats:
-    return np.asarray(values - taken @ (taken.T @ values))
+def _aligned(values: Floats, basis: Floats) -> Floats:
+    return np.asarray(values - basis @ (basis.T @ values))

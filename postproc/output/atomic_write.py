@@ -111,7 +111,7 @@ def _put_in_place(
     last: Path | None,
     still: Callable[[], None],
     locks: contextlib.ExitStack,
-    made: list[Path],
+    created: list[Path],
 ) -> None:
     # names are noted before their files are created: a signal may come between the two
     ready = {path: path.with_name(f".{_stem(path)}.{secrets.token_hex(4)}.tmp") for path in files}
@@ -124,7 +124,7 @@ def _put_in_place(
                 raise OSError(errno.EINVAL, problem)
             if at.is_dir() and not at.is_symlink():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-            made += [folder for folder in (at.parent, *at.parent.parents) if not os.path.lexists(folder)]
+            created += [folder for folder in (at.parent, *at.parent.parents) if not os.path.lexists(folder)]
             at.parent.mkdir(parents=True, exist_ok=True)
         if _lock_folders({path.parent for path in files}, locks):
             _sweep(files)

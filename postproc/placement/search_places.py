@@ -95,7 +95,7 @@ def search_places(
         def detailed(places: Floats, part: PartMotions = part, some: Scoring = part_scoring) -> Scores:
             return _clear(shapes, model, part, score_places(model, part, room, some, places, detailed=True))
 
-        known = score(start_places(room) if pool is None else _kept(room, pool))
+        known = score(start_places(room) if pool is None else _next_places(room, pool))
         niches = NICHES if pool is None and len(room.free) > 2 else NICHES // 3
         pool = Scores.join([known, evolve(room, score, known, niches)])
         if scoring.objective != P95:
@@ -130,7 +130,7 @@ def _clear(
     return replace(scores, violation=violation)
 
 
-def _kept(room: Room, pool: Scores) -> Floats:
+def _next_places(room: Room, pool: Scores) -> Floats:
     """(P, 6) of the ``pool``, best first, what the next round goes on with: the best, and others that are apart."""
     return pool.places[
         np.union1d(np.arange(min(AGAIN, len(pool.places))), distinct(room, pool.places, SPREAD))

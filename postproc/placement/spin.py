@@ -125,18 +125,18 @@ def scan_spins(
 
 
 def plan_spin(
-    scan: SpinScan, allowance: Floats, pinned: Bools, most: Floats, window: float, spread: int
+    scan: SpinScan, allowance: Floats, locked: Bools, most: Floats, window: float, spread: int
 ) -> Floats | None:
     """(M,) [rad] the turn of the tool at each place; None where no turn is feasible.
 
-    allowance (M,) [rad], ascending: see above; pinned (M,): places at which the tool does not turn; most (M,) [m]: no
+    allowance (M,) [rad], ascending: see above; locked (M,): places at which the tool does not turn; most (M,) [m]: no
     error becomes larger than this; window [rad] of the moving average; spread: steps of the grid to each side of the
     turn that are to be as good.
     """
     step = float(scan.angle[1] - scan.angle[0])
     nodes = _SpinNodes.of(allowance, step)
     still = len(scan.angle) // 2
-    near = _widened(allowance, pinned, 0.5 * window + step)
+    near = _widened(allowance, locked, 0.5 * window + step)
     allowed = scan.feasible & (scan.error <= most)
     allowed[still] = scan.feasible[still]
     allowed &= ~near | (np.arange(len(scan.angle)) == still)[:, None]
@@ -150,7 +150,7 @@ def plan_spin(
         return None
     chosen = _least_turning(np.where(cost <= level * (1 + 1e-9), cost, np.inf), nodes.gap, level)
     turn = nodes.smooth(scan.angle[chosen], allowance, window)
-    return np.where(pinned, 0.0, turn)
+    return np.where(locked, 0.0, turn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,9 +180,9 @@ class _SpinNodes:
         return np.asarray(np.interp(allowance, even, averaged))
 
 
-def _widened(allowance: Floats, pinned: Bools, by: float) -> Bools:
-    """(M,) places that are within ``by`` [rad] of allowance of a ``pinned`` one (M,)."""
-    at = allowance[pinned]
+def _widened(allowance: Floats, locked: Bools, by: float) -> Bools:
+    """(M,) places that are within ``by`` [rad] of allowance of a ``locked`` one (M,)."""
+    at = allowance[locked]
     if not len(at):
         return np.zeros(len(allowance), np.bool_)
     after = np.searchsorted(at, allowance)

@@ -49,27 +49,27 @@ def wrenches(
     motions are such as nobody cuts with (G0).  Refusal FRC001 to FRC005,
     FRC020, and those of a force CSV or a process file.
     """
-    given = _Given(program, toolpath, frames, offset, rapids)
+    request = _ForceRequest(program, toolpath, frames, offset, rapids)
     if spec is None:
-        given.no_offset("there is no --force")
+        request.no_offset("there is no --force")
         return Wrenches.zero(len(toolpath))
     if spec.strip():
-        stated, findings, source = given.explicit(spec.strip(), Path(), "", 0, f"--force {spec.strip()}")
+        stated, findings, source = request.explicit(spec.strip(), Path(), "", 0, f"--force {spec.strip()}")
     else:
-        stated, findings, source = _belonging(given, cell)
+        stated, findings, source = _belonging(request, cell)
     return turn_to_robot_axes(stated, toolpath, frames, cell, str(program), source, findings)
 
 
 def not_requested(program: Path, toolpath: Toolpath, cell: Cell) -> Finding:
     """FRC030: a run without --force, which would predict and correct nothing; its help names the force that the program
     has, or all ways to state one."""
-    source = _found(program, toolpath, cell)
+    source = _available_force(program, toolpath, cell)
     help = "add --force to the command" if source else ways_to_state(program, cell)
     message = "--force is missing, and without a force there is no deflection to predict or to correct"
     return Finding("FRC030", message + (f"; {source}" if source else ""), str(program), help=help)
 
 
-def _found(program: Path, toolpath: Toolpath, cell: Cell) -> str:
+def _available_force(program: Path, toolpath: Toolpath, cell: Cell) -> str:
     """A clause about the force that a bare --force takes; "" where there is none."""
     if any(_STATED.match(annotation.text.strip()) for annotation in toolpath.annotations):
         return "the program states its forces in FORCE comments"
@@ -94,7 +94,7 @@ def ways_to_state(program: Path, cell: Cell) -> str:
 
 
 @dataclass(frozen=True)
-class _Given:
+class _ForceRequest:
     """A program whose forces are sought."""
 
     program: Path
@@ -146,13 +146,13 @@ class _Given:
             raise Refusal(Finding("FRC020", message, str(self.program), help="use --force LOG.csv --tare"))
 
 
-def _belonging(given: _Given, cell: Cell) -> SourcedForces:
+def _belonging(request: _ForceRequest, cell: Cell) -> SourcedForces:
     """The force that belongs to the program, from the first source that exists."""
-    program = given.program
-    stated, findings = read_annotations(given.toolpath, str(program), given.rapids)
+    program = request.program
+    stated, findings = read_annotations(request.toolpath, str(program), request.rapids)
     beside = program.with_name(program.stem + ".force.csv")
     if stated is not None:
-        given.no_offset("the force comes from FORCE comments")
+        request.no_offset("the force comes from FORCE comments")
         if os.path.isfile(beside):
             message = f"{beside.name} is not used: the FORCE comments of the program come first"
             findings = (
@@ -161,12 +161,12 @@ def _belonging(given: _Given, cell: Cell) -> SourcedForces:
             )
         return stated, findings, "FORCE comments"
     if os.path.isfile(beside):
-        stated, more, source = given.table(beside)
+        stated, more, source = request.table(beside)
     elif cell.process is not None:
-        stated, more, _ = given.process(cell.path.parent / cell.process)
+        stated, more, _ = request.process(cell.path.parent / cell.process)
         source = f"cell: {cell.process}"
     elif cell.force is not None:
-        stated, more, _ = given.explicit(
+        stated, more, _ = request.explicit(
             cell.force, cell.path.parent, str(cell.path), cell.force_line, "force"
         )
         source = f"cell: {cell.force}"

@@ -36,7 +36,7 @@ def learned_page(learned: Learned, shape: PartShape, links: Mapping[str, str]) -
         ],
         notes=list(_notes(learned)),
         drawing=learned_picture(learned, shape, "svg"),
-        seen="deviation of each point: measured after the alignment, explained by causes and smooth error, and"
+        alt_text="deviation of each point: measured after the alignment, explained by causes and smooth error, and"
         " remaining, on one scale",
         findings=learned.findings,
         digests=dict(learned.data),

@@ -34,7 +34,7 @@ def identified_page(result: Identified, links: Mapping[str, str]) -> bytes:
             *identified_terminal.outlier_lines(result, True),
         ],
         drawing=identified_picture(result, "svg"),
-        seen="size of each residual before and after, by joint, direction, load and order; the tables show the same",
+        alt_text="size of each residual before and after, by joint, direction, load and order; as in the tables",
         findings=result.findings,
         digests={result.robot: result.robot_digest, **dict(result.data)},
     ).html(links)
@@ -62,7 +62,7 @@ def diagnosed_page(result: Diagnosed, links: Mapping[str, str]) -> bytes:
         facts=diagnosed_terminal.fact_rows(result),
         tables=[make(result, True) for make in makers],
         drawing=diagnosed_picture(result, "svg"),
-        seen="gap at each pose before and after, residual patterns, evidence of each candidate",
+        alt_text="gap at each pose before and after, residual patterns, evidence of each candidate",
         findings=result.findings,
         digests={result.robot: result.robot_digest, **dict(result.data)},
     ).html(links)
@@ -95,7 +95,7 @@ def mapped_page(mapped: Mapped, links: Mapping[str, str]) -> bytes:
         facts=map_rows(mapped),
         tables=[table],
         drawing=picture(mapped, "svg") if drawn else b"",
-        seen="deflection over the workspace; the CSV has every cell",
+        alt_text="deflection over the workspace; the CSV has every cell",
         findings=mapped.findings,
         digests={mapped.robot: mapped.digest},
     ).html(links)

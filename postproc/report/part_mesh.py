@@ -41,14 +41,14 @@ def band_colours(error: Floats, tolerance: float) -> np.ndarray[Any, np.dtype[np
     return np.where(np.isnan(error)[:, None], PLAIN, colours)
 
 
-def part_mesh(part: PartError, ending: str) -> bytes:
+def part_mesh(part: PartError, suffix: str) -> bytes:
     """The part as compensated, or as posted where nothing is, in one of the formats MESHES: coordinates in mm in the
     axes of the stock."""
     error = part.vertex_errors(part.after or part.before)
     vertices = (part.surface.vertices / MM).astype("<f4")
     faces = part.surface.faces.astype("<i4")
     colours = band_colours(error, part.figures.tolerance)
-    if ending == "ply":
+    if suffix == "ply":
         return _ply(vertices, faces, colours, (error / MM).astype("<f4"))
     return _glb(vertices, faces, colours)
 

@@ -22,7 +22,7 @@ def placement_page(done: Placement, links: Mapping[str, str]) -> bytes:
         facts=list(facts(done)),
         tables=tables(done),
         drawing=placement_picture(done, "svg"),
-        seen="the objective over x and y with all else as at the best place; the present and the best place",
+        alt_text="the objective over x and y with all else as at the best place; the present and the best place",
         findings=done.findings,
         digests={done.robot: done.digest},
     ).html(links)

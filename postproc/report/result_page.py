@@ -28,8 +28,8 @@ class PageTable:
 @dataclass(frozen=True, kw_only=True)
 class ResultPage:
     """What a page shows.  what: it is of; title; verdict: in words, with more of them in ``words``; exit: of the
-    command; facts: name and value; tables, as the terminal shows them; notes; drawing: SVG, with what is ``seen`` on
-    it; findings; digests: of the inputs."""
+    command; facts: name and value; tables, as the terminal shows them; notes; drawing: SVG, and ``alt_text`` for who
+    does not see it; findings; digests: of the inputs."""
 
     what: str
     title: str
@@ -41,7 +41,7 @@ class ResultPage:
     words: Sequence[str] = ()
     notes: Sequence[str] = ()
     drawing: bytes = b""
-    seen: str = ""
+    alt_text: str = ""
     digests: Mapping[str, str] = field(default_factory=dict)
 
     def html(self, links: Mapping[str, str]) -> bytes:
@@ -59,7 +59,7 @@ class ResultPage:
             tables=[one for one in map(shown, self.tables) if one.rows],
             notes=list(self.notes),
             drawing=Markup(f"data:image/svg+xml;base64,{drawing}") if drawing else "",
-            seen=self.seen,
+            alt_text=self.alt_text,
             findings=finding_rows(self.findings),
             more_findings=max(0, len(self.findings) - FINDINGS),
             digests=self.digests,

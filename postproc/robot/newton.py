@@ -240,7 +240,9 @@ def follow_rows(
         fresh = last_start[before] >= heads[k - 1]
         base = starts[last_start[before]] if fresh else state[k - 1]
         one = slice(before, before + 1)
-        there, fine = _stepped(solver, _taken(arm, base[None], fixed_values, one), flange[one], jumps[one])
+        there, fine = _stepped(
+            solver, _with_fixed_joint(arm, base[None], fixed_values, one), flange[one], jumps[one]
+        )
         state[k] = there[0] if fine[0] else base
     ends = state.copy()
     dirty = np.ones(len(heads), bool)
@@ -252,7 +254,7 @@ def follow_rows(
             rows = heads[part] + offset
             base = np.where(is_start[rows, None], starts[rows], ends[part])
             solution, fine = _stepped(
-                solver, _taken(arm, base, fixed_values, rows), flange[rows], jumps[rows]
+                solver, _with_fixed_joint(arm, base, fixed_values, rows), flange[rows], jumps[rows]
             )
             ends[part] = np.where(fine[:, None], solution, base)
             q[rows], good[rows] = np.where(fine[:, None], solution, np.nan), fine
@@ -262,7 +264,9 @@ def follow_rows(
     return q, good
 
 
-def _taken(arm: SerialArm, base: Floats, fixed_values: Floats | None, rows: Ints | slice) -> Floats:
+def _with_fixed_joint(
+    arm: SerialArm, base: Floats, fixed_values: Floats | None, rows: Ints | slice
+) -> Floats:
     """The angles ``base`` (K, n) with the fixed joint where it is in ``rows``."""
     if fixed_values is None or arm.fixed is None:
         return base

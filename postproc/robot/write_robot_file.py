@@ -320,11 +320,11 @@ def _untouched(section: YamlSection, effect: WrittenEffect | None) -> tuple[dict
     return others, [pair for pair in tree(section.section("parameters", {}).node) if pair[0] not in written]
 
 
-def _states(read: Identification, meant: Identification) -> bool:
-    rounding = ROUNDING * len(meant.names)
+def _states(read: Identification, expected: Identification) -> bool:
+    rounding = ROUNDING * len(expected.names)
     return (
-        replace(read, gap={}, correlation=meant.correlation) == replace(meant, gap={})
-        and read.gap.keys() == meant.gap.keys()
-        and all(math.isclose(read.gap[key], meant.gap[key], rel_tol=1e-5) for key in meant.gap)
-        and bool(np.allclose(read.correlation, meant.correlation, rtol=0.0, atol=rounding))
+        replace(read, gap={}, correlation=expected.correlation) == replace(expected, gap={})
+        and read.gap.keys() == expected.gap.keys()
+        and all(math.isclose(read.gap[key], expected.gap[key], rel_tol=1e-5) for key in expected.gap)
+        and bool(np.allclose(read.correlation, expected.correlation, rtol=0.0, atol=rounding))
     )

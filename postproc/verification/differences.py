@@ -139,7 +139,7 @@ def _new_stops(
     """Motions that stop where those of the original flow: anywhere but at the end of one that stops as well."""
     inside = np.append(motions.stretch[1:] == motions.stretch[:-1], False)[: len(motions.row)]
     rests = motions.row[stops(run.toolpath)[motions.row] & inside]
-    may = ending(simulator, samples)[stops(simulator.original.toolpath)]
+    may = end_rows(simulator, samples)[stops(simulator.original.toolpath)]
     return [
         Difference(int(row), True, "the motion stops where the original flows")
         for row in np.setdiff1d(rests, may)
@@ -160,7 +160,7 @@ def _missing(simulator: Simulator, samples: PathSamples) -> Ints:
     return rows[away > np.where(apart > NEAR * 1e-3, limit, NEAR)]
 
 
-def ending(simulator: Simulator, samples: PathSamples) -> Ints:
+def end_rows(simulator: Simulator, samples: PathSamples) -> Ints:
     """(N,) the row of the program that ends where a motion of the original ends: on a cut to which none was added the
     one of the same number, else that which ends nearest to it; -1 off the cuts."""
     rows, nearest, _, _ = _nearest_ends(simulator, samples)

@@ -231,7 +231,7 @@ def _spare_inputs(request: DiagnoseRequest) -> None:
 
 def _next_poses(request: DiagnoseRequest, measured: Measured, diagnosis: Diagnosis) -> NextPoses | None:
     """Poses, of those loads and targets that were used, at which the explanations disagree most; None where none do."""
-    offer = _offer(request, measured, diagnosis.search.base)
+    offer = _candidate_setups(request, measured, diagnosis.search.base)
     # where the arm was it can go again
     narrow = replace(offer, limits=_measured_ranges(measured.readings.q, offer.limits))
     if measured.readings.deflection and not len(offer.loads) + len(offer.pulls):
@@ -264,7 +264,7 @@ def _beyond(measured: Measured, plan: NextPoses, ranges: Floats) -> tuple[str, .
 
 
 def _discriminating_poses(
-    measured: Measured, diagnosis: Diagnosis, offer: CandidateSetups, one: Candidate, other: Candidate
+    measured: Measured, diagnosis: Diagnosis, candidates: CandidateSetups, one: Candidate, other: Candidate
 ) -> NextPoses | None:
     base = diagnosis.search.base
     model, first = composed(base.model, [one])
@@ -273,14 +273,16 @@ def _discriminating_poses(
     model = model.with_values(_values(diagnosis.search.final, first, one))
     common = [u for u in base.unknowns if u.prior is None]
     try:
-        poses = apart(model, first, second, common, offer, (NEXT,), candidates=CANDIDATES)
+        poses = apart(model, first, second, common, candidates, (NEXT,), candidates=CANDIDATES)
     except Refusal:
         return None
     if min(poses.separation[NEXT]) < HARDLY:
         return None
     setups = poses.chosen[NEXT]
-    setups = setups[measuring_order(setups.q, spacings(measured.robot, offer.spacing))]
-    return NextPoses(_like(measured, readings_of(model, offer, setups)), (one, other), poses.separation[NEXT])
+    setups = setups[measuring_order(setups.q, spacings(measured.robot, candidates.spacing))]
+    return NextPoses(
+        _like(measured, readings_of(model, candidates, setups)), (one, other), poses.separation[NEXT]
+    )
 
 
 def _like(measured: Measured, planned: Readings) -> Readings:
@@ -312,7 +314,7 @@ def _values(final: Fit, unknowns: Sequence[Unknown], candidate: Candidate) -> di
     return {u.key: fitted[u.parameter.name] for u in unknowns if u.parameter.name in fitted}
 
 
-def _offer(request: DiagnoseRequest, measured: Measured, base: Fit) -> CandidateSetups:
+def _candidate_setups(request: DiagnoseRequest, measured: Measured, base: Fit) -> CandidateSetups:
     """What was measured with: targets, weights within the payload, scatter; and pulls where there can be such."""
     readings, campaign = measured.readings, measured.campaign
     in_flange = campaign.tool.rotation @ base.point.nuisances.places[:, :, None]

@@ -242,7 +242,7 @@ def _touched(
     if findings:
         raise Refusal(*findings[:1])
     keep = np.flatnonzero(contacts.touched)
-    unsure = _unsure(job, point, normal, contacts)
+    unsure = _ambiguous(job, point, normal, contacts)
     keep = keep[~unsure[keep]]
     command, gone = None, 0
     if other is not None and pairing is not None:
@@ -321,7 +321,7 @@ def _restricted(job: CutProgram, part: MeasuredPart) -> dict[int, Ints]:
     return only
 
 
-def _unsure(job: CutProgram, point: Floats, normal: Floats, contacts: Contacts) -> Bools:
+def _ambiguous(job: CutProgram, point: Floats, normal: Floats, contacts: Contacts) -> Bools:
     """(K,) points that an earlier motion is predicted to have cut deeper than the last one."""
     unsure = np.zeros(len(point), bool)
     twice = np.flatnonzero(contacts.before.row >= 0)

@@ -159,9 +159,9 @@ def _turned_program(
         contents, unwritten = _texts(ready, axes, turns)
         if not unwritten:
             return turns, contents
-        pinned = path.pinned.copy()
-        pinned[[*unwritten]] = True
-        path = replace(path, pinned=pinned)
+        locked = path.locked.copy()
+        locked[[*unwritten]] = True
+        path = replace(path, locked=locked)
     return nothing, {}
 
 

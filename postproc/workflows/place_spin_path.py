@@ -24,11 +24,11 @@ MOST_HELD = 4
 
 @dataclass(frozen=True, eq=False)
 class SpinPath:
-    """N motions of a program: step (N,) [rad] by which the tool may turn in each; pinned (N,): at whose end it is as
+    """N motions of a program: step (N,) [rad] by which the tool may turn in each; locked (N,): at whose end it is as
     the program has it; length (N,) [m]; feed (N,) [m/s], NaN where it is not known."""
 
     step: Floats
-    pinned: Bools
+    locked: Bools
     length: Floats
     feed: Floats
 
@@ -49,9 +49,9 @@ def spin_path(ready: Prepared, axes: Floats) -> SpinPath:
     path, desired = ready.task.toolpath, ready.task.desired_path
     control, fixed = path.orientation_control, path.constraints
     straight = np.isin(path.kind, (Kind.LIN, Kind.CIRC))
-    pinned = ~straight | ~path.known | ~fixed.orientation_programmed | ~np.isfinite(axes[:, 0])
-    pinned |= np.isfinite(control.redundant_axis[:, 0])
-    pinned[[*fixed.refused, *fixed.locked]] = True
+    locked = ~straight | ~path.known | ~fixed.orientation_programmed | ~np.isfinite(axes[:, 0])
+    locked |= np.isfinite(control.redundant_axis[:, 0])
+    locked[[*fixed.refused, *fixed.locked]] = True
     turn = _turns(ready)
     # a motion whose inner orientations would become others stays as it is from its start to its end
     words = (control.path == OrientationPath.ROTARY_AXES) & ~(turn < SAME)
@@ -62,14 +62,14 @@ def spin_path(ready: Prepared, axes: Floats) -> SpinPath:
         | ~desired.traceable
         | ~straight
     )
-    pinned |= stiff
+    locked |= stiff
     # a motion to axis angles starts wherever the tool is, and ends as it always did
     to_axes = (path.kind == Kind.AXIS) & path.on_axes
-    pinned[:-1] |= (stiff & ~to_axes)[1:] | (path.tool[1:] != path.tool[:-1])
+    locked[:-1] |= (stiff & ~to_axes)[1:] | (path.tool[1:] != path.tool[:-1])
     for row in np.flatnonzero(~path.continues).tolist():
         before = path.predecessors.get(row, (row - 1,))
-        pinned[[row, *(one for one in before if one >= 0)]] = True
-    pinned[-1:] = True
+        locked[[row, *(one for one in before if one >= 0)]] = True
+    locked[-1:] = True
     length, feed = desired.length, np.where(path.feed > 0, path.feed, np.nan)
     step = np.fmin(PER_LENGTH * length, PER_TIME * length / feed)
     # turned evenly about two axes at once, the tool's axis leaves its path by an eighth of the product
@@ -77,7 +77,7 @@ def spin_path(ready: Prepared, axes: Floats) -> SpinPath:
         beside = 8 * ready.cell.tolerance_angle / np.where(turn > SAME, turn, 0.0)
     beside = np.where(control.path == OrientationPath.GREAT_CIRCLE, np.inf, beside)
     step = np.minimum(np.minimum(step, 0.5 * beside), PER_MOTION)
-    return SpinPath(np.where(to_axes, 2 * np.pi, np.where(stiff, 0.0, step)), pinned, length, feed)
+    return SpinPath(np.where(to_axes, 2 * np.pi, np.where(stiff, 0.0, step)), locked, length, feed)
 
 
 def _turns(ready: Prepared) -> Floats:
@@ -110,12 +110,12 @@ def plan_turns(ready: Prepared, motions: PartMotions, scan: SpinScan, path: Spin
     )
     reached = np.cumsum(path.step)
     allowance = reached[rows] - (1.0 - share) * path.step[rows]
-    pinned = path.pinned[rows] & (share == 1.0)
+    locked = path.locked[rows] & (share == 1.0)
     most, most_size = (_largest_of_cut(task.carries, rows, part[still]) for part in (error, size))
     whole = SpinScan(scan.angle, error, size, feasible & (size <= most_size))
     best, least = None, np.inf
     for window, spread in WINDOWS:
-        held = pinned
+        held = locked
         for _ in range(MOST_HELD):
             turn = plan_spin(whole, allowance, held, most, window, spread)
             if turn is None:
@@ -148,7 +148,7 @@ def refuse_unturnable(ready: Prepared, path: SpinPath) -> None:
     """Raises Refusal PLC013 where the text can turn the tool at no motion under force, with the reason of the first."""
     task, fixed = ready.task, ready.task.toolpath.constraints
     cut = np.flatnonzero(task.carries)
-    if not path.pinned[cut].all():
+    if not path.locked[cut].all():
         return
     row = int(cut[0])
     control = task.toolpath.orientation_control

@@ -107,7 +107,7 @@ def plan(request: PlanRequest, stage: Stage = silent) -> Planned:
     robot = load_robot(find_robot(request.robot))
     model = StiffnessModel.from_robot(robot)
     asked = asked_for(model, request.effects)
-    offer = _offer(request, robot, asked.model, asked.unknowns)
+    offer = _candidate_setups(request, robot, asked.model, asked.unknowns)
     if request.discriminate is not None:
         planned = _discriminating_poses(request, offer, asked.model, asked.unknowns, stage)
     else:
@@ -138,7 +138,7 @@ def plan(request: PlanRequest, stage: Stage = silent) -> Planned:
 
 def _for_precision(
     request: PlanRequest,
-    offer: CandidateSetups,
+    candidates: CandidateSetups,
     model: StiffnessModel,
     unknowns: tuple[Unknown, ...],
     stage: Stage,
@@ -151,11 +151,11 @@ def _for_precision(
     before, findings = None, list[Finding]()
     if request.measured:
         known = measured_of(request.measured, request.robot, request.tool_mm_deg)
-        before = measured(model, unknowns, known.campaign, offer.sigma)
+        before = measured(model, unknowns, known.campaign, candidates.sigma)
         findings += known.findings
     counts = np.array([unknown.prior is None for unknown in unknowns]) | named
     criterion = request.criterion or ("test" if tests is not None else "minimax")
-    task = DesignProblem(model, unknowns, offer, wanted, counts, criterion, before, tests)
+    task = DesignProblem(model, unknowns, candidates, wanted, counts, criterion, before, tests)
     design = designs(task, request.poses, SIZES, request.seed, CANDIDATES, stage)
     return Planned(
         robot=model.robot.name,
@@ -163,7 +163,7 @@ def _for_precision(
         effects=request.effects,
         model=design.model,
         unknowns=unknowns,
-        setups_offered=offer,
+        setups_offered=candidates,
         seed=request.seed,
         criterion=criterion,
         wanted=wanted,
@@ -183,7 +183,7 @@ def _for_precision(
 
 def _discriminating_poses(
     request: PlanRequest,
-    offer: CandidateSetups,
+    candidates: CandidateSetups,
     model: StiffnessModel,
     unknowns: tuple[Unknown, ...],
     stage: Stage,
@@ -203,11 +203,11 @@ def _discriminating_poses(
             raise Refusal(Finding("PLN006", message, str(model.robot.path)))
     common = tuple(unknown for unknown in unknowns if unknown.key not in keys[0] | keys[1])
     sizes = {min(FEWEST, request.poses), request.poses}
-    selection = apart(model, first, second, common, offer, sizes, request.seed, CANDIDATES, stage)
+    selection = apart(model, first, second, common, candidates, sizes, request.seed, CANDIDATES, stage)
     setups = selection.chosen[request.poses]
     wanted, named, source = _wanted(request, unknowns)
     counts = np.array([unknown.prior is None for unknown in unknowns]) | named
-    task = DesignProblem(model, unknowns, offer, wanted, counts)
+    task = DesignProblem(model, unknowns, candidates, wanted, counts)
     findings = []
     if min(selection.separation[request.poses]) < CLEAR:
         words = discrimination_words(request.discriminate, selection.separation[request.poses])
@@ -218,7 +218,7 @@ def _discriminating_poses(
         effects=request.effects,
         model=model,
         unknowns=unknowns,
-        setups_offered=offer,
+        setups_offered=candidates,
         seed=request.seed,
         criterion="discriminate",
         wanted=wanted,
@@ -257,7 +257,7 @@ def _spare_inputs(request: PlanRequest) -> None:
             raise Refusal(Finding("FIL007", "the output would replace an input", str(path)))
 
 
-def _offer(
+def _candidate_setups(
     request: PlanRequest, robot: Robot, model: StiffnessModel, unknowns: Sequence[Unknown]
 ) -> CandidateSetups:
     """What the user can set up, in SI.  Raises Refusal PLN001, PLN005, PLN006."""
@@ -395,10 +395,10 @@ def _tests(
     return model, np.asarray(np.linalg.qr(moves.reshape(-1, len(entries)) / np.sqrt(len(moves)), mode="r"))
 
 
-def _in_sight(offer: CandidateSetups, model: StiffnessModel, setups: Setups) -> Readings:
+def _in_sight(candidates: CandidateSetups, model: StiffnessModel, setups: Setups) -> Readings:
     """The readings to be taken."""
     visible = np.repeat(setups.visible[:, None], setups.load.shape[1], axis=1).reshape(-1)
-    return readings_of(model, offer, setups).part(np.flatnonzero(visible))
+    return readings_of(model, candidates, setups).part(np.flatnonzero(visible))
 
 
 def _about(request: PlanRequest, planned: Planned, readings: int) -> list[str]:

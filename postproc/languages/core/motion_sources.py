@@ -40,16 +40,16 @@ def met(own: frozenset[Source], other: frozenset[Source], meeting: Meeting) -> f
     return frozenset([meeting])
 
 
-def expanded(sources: Iterable[Source], seen: set[Meeting]) -> set[int]:
-    """What is among sources, with those after meetings that are not in ``seen``, to which they are added."""
+def expanded(sources: Iterable[Source], visited: set[Meeting]) -> set[int]:
+    """What is among sources, with those after meetings that are not in ``visited``, to which they are added."""
     found: set[int] = set()
     todo = list(sources)
     while todo:
         source = todo.pop()
         if isinstance(source, int):
             found.add(source)
-        elif source not in seen:
-            seen.add(source)
+        elif source not in visited:
+            visited.add(source)
             todo.extend(source.sources)
     return found
 

@@ -68,11 +68,11 @@ class PlanRows:
         self._refuse_forbidden(touched, way)
         return touched, way
 
-    def _refuse_forbidden(self, touched: Bools, way: Bools) -> None:
+    def _refuse_forbidden(self, touched: Bools, path_changes: Bools) -> None:
         path, plan = self.path, self.plan
         fixed = path.constraints
         moved = {row for row in (*fixed.refused, *fixed.locked) if touched[row]}
-        moved |= {row for row in fixed.refused if way[row]}
+        moved |= {row for row in fixed.refused if path_changes[row]}
         moved |= set(np.flatnonzero(touched & (path.kind == Kind.AXIS)).tolist())
         if moved:
             raise ValueError(f"motions that cannot be corrected are moved: rows {sorted(moved)[:5]}")

@@ -16,7 +16,7 @@ from postproc.languages.gcode.execution_flow import FlowReason
 from postproc.languages.gcode.integer_words import IntegerWords
 from postproc.languages.gcode.modal import Modal
 from postproc.languages.gcode.modal_fill import everywhere, lookup
-from postproc.languages.gcode.positions import Course
+from postproc.languages.gcode.positions import AxisWords
 from postproc.languages.gcode.source import Source, WordColumn
 from postproc.languages.gcode.words import COLUMNS, How, key
 
@@ -190,10 +190,10 @@ class BlockWords:
         return lookup(self.modal.force[Group.UNITS], small)
 
     @cached_property
-    def unclear(self) -> Bools:
+    def ambiguous(self) -> Bools:
         """(B,) blocks with a length of which it is not known what it means without a decimal point."""
         mask = np.zeros(len(self), np.bool_)
-        for one in (*AXES[:3], *(key(letter) for letter in "IJKR")) if self.integers.unclear else ():
+        for one in (*AXES[:3], *(key(letter) for letter in "IJKR")) if self.integers.ambiguous else ():
             column = self.words(one)
             mask[column.block[(column.how == How.INTEGER) & (column.value != 0)]] = True
         return mask
@@ -301,7 +301,7 @@ CYCLES = (73.0, *(float(code) for code in range(81, 90)))
 
 def frame_events(
     words: BlockWords, spoiled: Bools, away: Bools, ends: Floats, lengths: Bools, reasons: Reasons
-) -> Course:
+) -> AxisWords:
     """What the blocks do to the coordinates; why they leave them unknown is put into ``reasons``.
 
     spoiled (B,): blocks before which the base became another one; away (B,): see ``tilted``; ends (B,) [m]: as of
@@ -331,9 +331,9 @@ def frame_events(
     move, cycle = words.move, words.motion & (words.move == Move.CYCLE)
     unread = target & np.isnan(value)
     lose(unread, np.any(unread, axis=1), What.WORD)
-    lose(whole, words.axis & words.unclear, What.INTEGER)
-    unclear = target & (force[Group.DISTANCE] < 0)[:, None]
-    lose(unclear, np.any(unclear, axis=1), What.MODE)
+    lose(whole, words.axis & words.ambiguous, What.INTEGER)
+    ambiguous = target & (force[Group.DISTANCE] < 0)[:, None]
+    lose(ambiguous, np.any(ambiguous, axis=1), What.MODE)
     home, other = words.motion & modal.has(Once.HOME), np.isin(move, (Move.OTHER,)) & words.motion
     lose(present | ~np.any(present, axis=1)[:, None], home, What.REFERENCE)
     lose(present, words.motion & modal.has(Once.MACHINE), What.MACHINE)
@@ -388,4 +388,4 @@ def frame_events(
         # Along the tool, which only rotary axes away from 0 can lay elsewhere than along Z.
         leave(np.arange(6) == 2, lengths, What.LENGTH)
         leave(linear, lengths & away, What.LENGTH)
-    return Course(np.where(target, value, 0.0), target & ~relative, relative, lost, left)
+    return AxisWords(np.where(target, value, 0.0), target & ~relative, relative, lost, left)

@@ -31,14 +31,16 @@ class Remarks(NamedTuple):
     marker_at: Span
 
 
-def remarks(document: Document, source: Source, steps: Ints, in_text_order: bool, foreign: Bools) -> Remarks:
-    """``steps`` (N,): blocks of ``source`` that are the motions; foreign (B,): those of other files."""
+def remarks(
+    document: Document, source: Source, steps: Ints, in_text_order: bool, in_other_file: Bools
+) -> Remarks:
+    """``steps`` (N,): blocks of ``source`` that are the motions; in_other_file (B,): those of other files."""
     raw, run = document.raw, source.blocks.line
     comments = source.comments
     if in_text_order:
         rows = np.searchsorted(run[steps], comments[:, 2])
     else:
-        comments, rows = _passed(comments, run, steps, foreign)
+        comments, rows = _passed(comments, run, steps, in_other_file)
     marker = _marker(raw, source.comments)
     spans, lines = comments[:, :2], comments[:, 2]
     alone = ~np.isin(lines, source.blocks.line[source.blocks.wordy]) if len(lines) else lines
@@ -70,12 +72,12 @@ def _marker(raw: bytes, comments: Ints) -> Span | None:
     return next((Span(0, *span) for span in spans if _text(raw[slice(*span)]).startswith(MARK)), None)
 
 
-def _passed(comments: Ints, run: Ints, steps: Ints, foreign: Bools) -> tuple[Ints, Ints]:
+def _passed(comments: Ints, run: Ints, steps: Ints, in_other_file: Bools) -> tuple[Ints, Ints]:
     """The comments in the order in which the run passes them, each as often as it does; the motions after them."""
     if not len(comments) or not len(run):
         return comments, comments[:, 2]
     lines = comments[:, 2]
-    cuts = np.flatnonzero((np.diff(run) <= 0) & ~foreign[1:]) + 1
+    cuts = np.flatnonzero((np.diff(run) <= 0) & ~in_other_file[1:]) + 1
     which, at = [], []
     for start, stop in zip(np.append(0, cuts).tolist(), np.append(cuts, len(run)).tolist(), strict=True):
         low, high = np.searchsorted(lines, [run[start], run[stop - 1] + 1]).tolist()

@@ -114,7 +114,7 @@ def check_correctability(
         "the block has U, V or W: they are further axes, or steps of a lathe",
     )
     refuse(
-        words.unclear[rows],
+        words.ambiguous[rows],
         "GCO022",
         "a length without a decimal point is mm or an increment: the program has both kinds of words",
     )
@@ -290,9 +290,9 @@ _WAY = tuple(key(letter, index) for letter in "ABCIJK" for index in (1, 2, 3))
 """Words of the way itself: the point between, orientations."""
 
 
-def no_insert_before(words: BlockWords, rows: Ints, foreign: Bools) -> dict[int, str]:
+def no_insert_before(words: BlockWords, rows: Ints, in_other_file: Bools) -> dict[int, str]:
     """Motions, in the blocks ``rows`` (N,), before which nothing may be inserted, because their block says more than
-    the motion, or is in another file (``foreign`` (B,))."""
+    the motion, or is in another file (``in_other_file`` (B,))."""
     modal = words.modal
     more = modal.more | words.noted("assign", "corner", "axis", "polar")
     others = (one for one in words.control.columns if one not in _WAY)
@@ -306,7 +306,7 @@ def no_insert_before(words: BlockWords, rows: Ints, foreign: Bools) -> dict[int,
     found: dict[int, str] = {}
     for mask, why in (
         (timed, "F is the time of the whole block (G93)"),
-        (foreign, "its block is in another file"),
+        (in_other_file, "its block is in another file"),
         (more, "its block contains more than the motion"),
         (modal.flow.entered, "a jump leads to its block"),
         (feeds_before_units(words), "its F is in the unit from before it"),

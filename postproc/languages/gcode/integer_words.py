@@ -20,11 +20,11 @@ without a point."""
 
 
 class IntegerWords(NamedTuple):
-    """increments: they are micrometres (or 0.0001 inch), else mm (or inch); unclear: the program does not say which;
+    """increments: they are micrometres (or 0.0001 inch), else mm (or inch); ambiguous: the program does not say which;
     message: what is reported of it, "" for nothing."""
 
     increments: bool
-    unclear: bool = False
+    ambiguous: bool = False
     message: str = ""
 
 
@@ -48,4 +48,4 @@ def integer_words(source: Source, control: Control, stated: str) -> IntegerWords
         )
     if not (decimals % 1 == 0).any() or largest <= max(ALIKE * farthest, SMALL):
         return IntegerWords(False, message="lengths without a decimal point are read as mm (or inch)")
-    return IntegerWords(False, unclear=True)
+    return IntegerWords(False, ambiguous=True)

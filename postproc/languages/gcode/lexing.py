@@ -58,7 +58,9 @@ def lex(raw: bytes, control: Control, start: int = 0, end: int | None = None, li
     kinds = np.frombuffer(clean.translate(_CLASSES), np.uint8)
     plain, odd, ends = _plain(letters, kinds, control.parameter)
     starts = np.concatenate([[0], ends[:-1] + 1])
-    other = _taken([clean[starts[i] : ends[i]] for i in odd], np.array(odd, dtype=np.int64), starts, control)
+    other = _other_lines(
+        [clean[starts[i] : ends[i]] for i in odd], np.array(odd, dtype=np.int64), starts, control
+    )
     words, blocks, notes = _joined(feeds, plain, other, starts, ends)
     if start:
         for places in (words.at, words.stop, blocks.start, blocks.stop, blocks.first, blocks.code):
@@ -197,16 +199,16 @@ def _long(text: bytes) -> tuple[float, int]:
 
 @dataclass(frozen=True, eq=False)
 class _Other:
-    """Words of the other lines; notes: of which line, their kinds and texts; said: lines with notes or a slash;
+    """Words of the other lines; notes: of which line, their kinds and texts; commented: lines with notes or a slash;
     deleted: those with a slash."""
 
     words: _Plain
     notes: list[tuple[int, str, str]]
-    said: Ints
+    commented: Ints
     deleted: Ints
 
 
-def _taken(texts: list[bytes], rows: Ints, starts: Ints, control: Control) -> _Other:
+def _other_lines(texts: list[bytes], rows: Ints, starts: Ints, control: Control) -> _Other:
     """The lines that are not plain, each text taken apart once; ``rows``: their numbers."""
     number: dict[bytes, int] = {}
     which = np.array([number.setdefault(text, len(number)) for text in texts], dtype=np.int64)
@@ -253,7 +255,7 @@ def _joined(
     lines = np.concatenate([plain.line, extra.line])[order]
     some = np.zeros(len(starts), np.bool_)
     some[lines] = True
-    some[other.said] = True
+    some[other.commented] = True
     used = np.flatnonzero(some)
     key = np.concatenate([plain.key, extra.key])[order]
     value = np.concatenate([plain.value, extra.value])[order]
@@ -283,5 +285,7 @@ def _joined(
         deleted=deleted[used],
     )
     where = np.searchsorted(used, np.array([row for row, _, _ in other.notes], dtype=np.int64)).tolist()
-    notes = tuple(Note(block, kind, said) for block, (_, kind, said) in zip(where, other.notes, strict=True))
+    notes = tuple(
+        Note(block, kind, commented) for block, (_, kind, commented) in zip(where, other.notes, strict=True)
+    )
     return words, blocks, notes

@@ -47,7 +47,7 @@ class GcodeMotions:
         end: Floats,
         where: Positions,
         arcs: ArcGeometry,
-        stand: ToolOrientation,
+        orientation: ToolOrientation,
     ) -> GcodeMotions:
         """Of ``block``, ``move``, ``kind``, ``plane`` (N,), ``start`` and ``end`` (N, 6) [m, rad] as of the class."""
         turn = np.array([frame.turn for frame in where.frames])[where.frame[block]]
@@ -73,7 +73,7 @@ class GcodeMotions:
             centre,
             normal,
             length,
-            stand,
+            orientation,
             everywhere(np.nan, len(block)),
             everywhere(OWN, len(block), np.int8),
         )

@@ -126,7 +126,7 @@ def _offset_events(words: BlockWords) -> list[tuple[int, int | None, Floats | No
         read = (
             (words.modal.flow.reason == FlowReason.NONE)
             & ~words.has(*AXES[3:])
-            & ~words.unclear
+            & ~words.ambiguous
             & ~words.twice
         )
         if fanuc:  # in G91 the values are added

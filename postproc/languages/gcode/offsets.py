@@ -27,7 +27,7 @@ def one_shift(event: Event) -> ProgrammedFrame:
     """LinuxCNC: G52 and G92 share their shift; G92.1 clears, G92.2 suspends and G92.3 restores it."""
     frame = event.frame
     saved = np.full(6, np.nan) if frame.memory is None else frame.memory
-    given, mentioned = _given(event)
+    given, mentioned = _axis_words(event)
     if event.once & (1 << Once.LOCAL):
         shift = np.where(mentioned, given, frame.shift)
     elif event.once & (1 << Once.SHIFT):
@@ -46,7 +46,7 @@ def two_shifts(event: Event) -> ProgrammedFrame:
     (programming manuals, "workpiece coordinate system preset")."""
     frame = event.frame
     local = np.zeros(6) if frame.memory is None else frame.memory
-    given, mentioned = _given(event)
+    given, mentioned = _axis_words(event)
     if event.once & (1 << Once.LOCAL):
         rest = frame.shift - local
         local = np.where(mentioned, given, local)
@@ -60,7 +60,7 @@ def two_shifts(event: Event) -> ProgrammedFrame:
     return replace(frame, shift=np.where(named, cleared, frame.shift), memory=np.where(named, cleared, local))
 
 
-def _given(event: Event) -> tuple[Floats, Floats]:
+def _axis_words(event: Event) -> tuple[Floats, Floats]:
     """(6,) values [m, rad] of the axis words of the block, 0 where absent; which are there."""
     scale = np.array([event.scale] * 3 + [DEG] * 3)
     values = np.array([event.words.get(axis, 0.0) for axis in _AXES])

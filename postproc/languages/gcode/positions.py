@@ -20,18 +20,18 @@ MOST = 2000
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class AxisWords:
     """What the blocks do to the coordinates X, Y, Z, A, B, C, each (B, 6).
 
     value (B, 6) [m, rad]; sets (B, 6): it is a coordinate; adds (B, 6): a difference; unknown (B, 6): lost after the
-    block; left (B, 6): unknown already before it.
+    block; unknown_before (B, 6): unknown already before it.
     """
 
     value: Floats
     sets: Bools
     adds: Bools
     unknown: Bools
-    left: Bools
+    unknown_before: Bools
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +78,9 @@ class Trace:
         """Rows (K,) in ``frames`` of blocks (K,) that were followed."""
         return np.searchsorted(self._events, blocks, side="right").astype(np.int16)
 
-    def follow(self, course: Course, start: int) -> Positions:
+    def follow(self, axis_words: AxisWords, start: int) -> Positions:
         """The next blocks, of which ``start`` is the first."""
-        n = len(course.value)
+        n = len(axis_words.value)
         found = Positions(
             np.empty((n, 6)),
             np.empty((n, 6)),
@@ -91,17 +91,17 @@ class Trace:
         low, high = np.searchsorted(self._events, [start, start + n]).tolist()
         at = 0
         for event in (self._events[low:high] - start).tolist():
-            self._scan(course, slice(at, event), start, found)
-            self._turn(start + event, course.left[event])
+            self._scan(axis_words, slice(at, event), start, found)
+            self._turn(start + event, axis_words.unknown_before[event])
             at = event
-        self._scan(course, slice(at, n), start, found)
+        self._scan(axis_words, slice(at, n), start, found)
         return found
 
-    def _turn(self, event: int, left: Bools) -> None:
+    def _turn(self, event: int, unknown_before: Bools) -> None:
         """Goes on in the frame after ``event``; after too many nothing is known.  left (6,): coordinates that are
         unknown already before it."""
-        self._here = np.where(left, np.nan, self._here)
-        self._origin = np.where(left, event, self._origin)
+        self._here = np.where(unknown_before, np.nan, self._here)
+        self._origin = np.where(unknown_before, event, self._origin)
         there = self.frames[-1].to_base(self._here)
         frame = self._change(event, self.frames[-1], there)
         if len(self.frames) == MOST:
@@ -110,20 +110,26 @@ class Trace:
         self._here = frame.from_base(there)
         self._origin = np.where(np.isnan(self._here), event, self._origin)
 
-    def _scan(self, course: Course, piece: slice, first: int, found: Positions) -> None:
+    def _scan(self, axis_words: AxisWords, piece: slice, first: int, positions: Positions) -> None:
         if piece.stop > piece.start:
-            found.start[piece], found.end[piece], found.source[piece] = _scan(
-                course, piece, self._here, self._origin, first
+            positions.start[piece], positions.end[piece], positions.source[piece] = _scan(
+                axis_words, piece, self._here, self._origin, first
             )
-            self._here, self._origin = found.end[piece.stop - 1].copy(), found.source[piece.stop - 1].copy()
+            self._here, self._origin = (
+                positions.end[piece.stop - 1].copy(),
+                positions.source[piece.stop - 1].copy(),
+            )
 
 
 def _scan(
-    course: Course, piece: slice, here: Floats, origin: Ints, first: int
+    axis_words: AxisWords, piece: slice, here: Floats, origin: Ints, first: int
 ) -> tuple[Floats, Floats, Ints]:
-    value, sets, adds = course.value[piece], course.sets[piece], course.adds[piece]
-    lost, left = course.unknown[piece], course.left[piece] & ~course.sets[piece]
-    gone = lost | left | (adds & np.isnan(value))
+    value, sets, adds = axis_words.value[piece], axis_words.sets[piece], axis_words.adds[piece]
+    lost, unknown_before = (
+        axis_words.unknown[piece],
+        axis_words.unknown_before[piece] & ~axis_words.sets[piece],
+    )
+    gone = lost | unknown_before | (adds & np.isnan(value))
     anchor = sets | gone
     n = len(value)
     where = np.maximum.accumulate(np.where(anchor, np.arange(n)[:, None], -1), axis=0)
@@ -134,5 +140,5 @@ def _scan(
     end = np.where(where >= 0, known[row, column] + (total - total[row, column]), here + total)
     source = np.where(where >= 0, where + (first + piece.start), origin)
     start = np.concatenate([here[None], end[:-1]])
-    start[course.left[piece]] = np.nan
+    start[axis_words.unknown_before[piece]] = np.nan
     return start, end, source

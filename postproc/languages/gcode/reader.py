@@ -322,7 +322,7 @@ def _columns(
         "normal": np.where(placed, moves.normal, np.nan),
         "sweep": np.where(placed[:, 0], moves.arcs.sweep, np.nan),
         # controls accept no rotary words in a drill cycle
-        "orientation_programmed": stand.oriented & np.isnan(moves.room),
+        "orientation_programmed": stand.writable & np.isnan(moves.room),
         "redundant_axis": stand.redundant_axis,
         "orientation_path": stand.path,
         "rotary_from": rotary_from,
@@ -377,7 +377,7 @@ def _change(
             for one in keys
             if len(column := here.words(one))
         }
-        if here.unclear.any():
+        if here.ambiguous.any():
             words = {one: math.nan if one in AXES[:3] else value for one, value in words.items()}
         codes = tuple(here.words(key("G")).value.tolist())
         event = Event(

@@ -144,10 +144,10 @@ class RunCalls(RunState):
         if start is None or math.isnan(count) or count != math.floor(count):
             raise NotFollowed
         self.emit(block, block + 1)
-        if statement.way == "B":
+        if statement.direction == "B":
             stop = start + 1
-        elif statement.way:
-            end = self.labels.find(FlowStatement(block, statement.verb, statement.way), start)
+        elif statement.direction:
+            end = self.labels.find(FlowStatement(block, statement.verb, statement.direction), start)
             if end is None or end < start:
                 raise NotFollowed
             stop = end

@@ -257,7 +257,9 @@ class RunFlow(RunCalls):
         number = self.value(statement.label, statement.block)
         if math.isnan(number):
             raise NotFollowed
-        return FlowStatement(statement.block, statement.verb, f"{number:.0f}", statement.text, statement.way)
+        return FlowStatement(
+            statement.block, statement.verb, f"{number:.0f}", statement.text, statement.direction
+        )
 
     def branch_away(self, statement: FlowStatement) -> int:
         """A jump that happens only sometimes: what it passes may run or not.  Raises NotFollowed."""

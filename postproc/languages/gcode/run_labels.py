@@ -67,7 +67,7 @@ class RunLabels:
         if len(inside) != 1:
             return None
         wrong = {"F": inside[0] <= statement.block, "B": inside[0] > statement.block}
-        return None if wrong.get(statement.way, False) and statement.verb.name == "GOTO" else inside[0]
+        return None if wrong.get(statement.direction, False) and statement.verb.name == "GOTO" else inside[0]
 
     def number(self, number: int, block: int) -> int | None:
         """The block with a number in the program that ``block`` is in."""

@@ -94,10 +94,10 @@ class SinumerikLines:
         self._names, self._tools = names, tools
 
     def __call__(self, text: bytes) -> LexedLine:
-        return _Taken(text, self._names, self._tools).line()
+        return _SinumerikLine(text, self._names, self._tools).line()
 
 
-class _Taken:
+class _SinumerikLine:
     def __init__(
         self, text: bytes, names: Mapping[bytes, tuple[float, ...]], tools: Mapping[bytes, int]
     ) -> None:
@@ -239,22 +239,22 @@ class _Taken:
             return self.arguments(end)
         return self.statement(name, place, end)
 
-    def assigned(self, name: bytes, place: int, behind: int) -> int:
+    def assigned(self, name: bytes, place: int, after: int) -> int:
         """``NAME=`` or ``NAME[..]=``."""
         if name in NAMED_WORDS:
-            return self.value(place, NAMED_WORDS[name], behind)
-        close = expression_end(self.text, behind)
+            return self.value(place, NAMED_WORDS[name], after)
+        close = expression_end(self.text, after)
         end = len(self.text[:close].rstrip())
         if name in ACTIONS:
             # It acts before the motion, as S and M do.
             self.word(place, key("S"), -1, end, math.nan, How.UNREAD)
         elif name in SWITCHES:
-            off = constant(self.text[behind:end]) == (100 if name == b"OVR" else 0)
+            off = constant(self.text[after:end]) == (100 if name == b"OVR" else 0)
             self.codes(place, end, SWITCHES[name] + (b"(OFF)" if off else b"(ON)"))
         elif name == b"FB":
             self.note("feed", name)
         elif name in (b"ID", b"IDS"):
-            return self.statement(name, place, behind)
+            return self.statement(name, place, after)
         elif name in CORNERS or name in POLAR:
             self.note("corner" if name in CORNERS else "polar", name)
         elif name in SETTINGS:
@@ -265,9 +265,9 @@ class _Taken:
             # In a block with other words it can only be an axis of the machine.
             self.note("axis", name)
         else:
-            close = assigned_end(self.text, behind)
+            close = assigned_end(self.text, after)
             self.note("assign", self.text[place:close].strip())
-        return max(close, behind + 1)
+        return max(close, after + 1)
 
     def arguments(self, end: int) -> int:
         """After the brackets that follow, if there are any."""

@@ -38,13 +38,13 @@ OPENING = frozenset((Verb.SUB, Verb.WHILE, Verb.DO, Verb.REPEAT, Verb.IF, Verb.F
 @dataclass(frozen=True)
 class FlowStatement:
     """label: of the construct that it opens, closes or leaves, where it leads to, or what it calls; text: its
-    condition, count, arguments or bounds; way: of a jump, "F" forward, "B" backward, "" both."""
+    condition, count, arguments or bounds; direction: of a jump, "F" forward, "B" backward, "" both."""
 
     block: int
     verb: Verb
     label: str = ""
     text: str = ""
-    way: str = ""
+    direction: str = ""
 
 
 @dataclass

@@ -38,13 +38,13 @@ _SEQUENCES = {EULER: ((2, 0), (0, 1), (2, 2)), RPY: ((2, 2), (1, 1), (0, 0))}
 
 @dataclass(frozen=True, eq=False)
 class ToolOrientation:
-    """rotation (N, 3, 3); oriented (N,): the words can be written; redundant_axis (N, 3): redundant axis; wrong (N,):
+    """rotation (N, 3, 3); writable (N,): the words can be written; redundant_axis (N, 3): redundant axis; wrong (N,):
     0, or 1 rotary axes away from 0 or not known without a TCP mode, 2 not known in one.  orient (N,) row in
     ``ToolOrientations.orientations``, -1 where none is in force; values, before (N, 3): as in Places.  stated (N,):
     the block itself states the whole orientation in force.  path (N,) OrientationPath."""
 
     rotation: Floats
-    oriented: Bools
+    writable: Bools
     redundant_axis: Floats
     wrong: Ints
     orient: Ints
@@ -138,7 +138,7 @@ class ToolOrientations:
             result.rotation[good] = orientation.rotation(values[known])
             # A pair of axes can be written at its pole as well: the outer one stays near its place (rotary.pointing).
             pair = one == ROTARY and int(self._used.sum()) == 2 and self._turned is not None
-            result.oriented[good] = (pair | orientation.writable(values[known])) & ~shifted[known]
+            result.writable[good] = (pair | orientation.writable(values[known])) & ~shifted[known]
             result.path[good] = self._path(one)
             result.redundant_axis[good] = orientation.redundant_axis
         return result

@@ -65,7 +65,7 @@ def edit_targets(program: Program, plan: Plan, writing: WritingSettings) -> Edit
 def _written(style: Style, motions: WrittenMotions, before: Ends) -> tuple[Edits, dict[int, str], Ends]:
     """The edits of some motions; those that are held, and why; where the words are after the last of them."""
     text, places = motions.text, motions.places
-    sheet = _Sheet.empty(len(motions), text.decimals[motions.row])
+    sheet = _Literals.empty(len(motions), text.decimals[motions.row])
     ends = _positions(motions, sheet, before.position)
     held, turned = _orientations(motions, sheet, before.turned)
     convert, bad = _arcs(motions, ends, sheet)
@@ -126,7 +126,7 @@ class _Forbidden:
 
 
 @dataclass(frozen=True, eq=False)
-class _Sheet:
+class _Literals:
     """What is written of M motions: write, number, decimals (M, 10)."""
 
     write: Bools
@@ -134,9 +134,9 @@ class _Sheet:
     decimals: Ints
 
     @staticmethod
-    def empty(count: int, decimals: Ints) -> _Sheet:
+    def empty(count: int, decimals: Ints) -> _Literals:
         shape = (count, COLUMNS)
-        return _Sheet(np.zeros(shape, dtype=bool), np.full(shape, np.nan), decimals)
+        return _Literals(np.zeros(shape, dtype=bool), np.full(shape, np.nan), decimals)
 
 
 def _resumed(motions: WrittenMotions, origin: Floats, ends: Floats) -> Bools:
@@ -153,7 +153,7 @@ def _stated_columns(motions: WrittenMotions, columns: slice) -> tuple[Floats, Bo
     return own, np.where(np.isnan(own), text.modal[row, columns], text.relative[row, columns])
 
 
-def _positions(motions: WrittenMotions, sheet: _Sheet, before: Floats) -> Followed:
+def _positions(motions: WrittenMotions, literals: _Literals, before: Floats) -> Followed:
     """Follows X Y Z from where the motion ahead ended; fills their columns of the sheet."""
     path, places, text, row = motions.path, motions.places, motions.text, motions.row
     source = np.where(motions.own[:, None], text.units(row, path.position[row]), np.nan)
@@ -164,9 +164,9 @@ def _positions(motions: WrittenMotions, sheet: _Sheet, before: Floats) -> Follow
         source,
         own,
         relative,
-        sheet.decimals[:, AXES],
+        literals.decimals[:, AXES],
         motions.fixed,
-        _closed(motions, sheet),
+        _closed(motions, literals),
         start,
         _resumed(motions, start, text.units(row, path.position[row - 1])),
     )
@@ -183,7 +183,7 @@ def _positions(motions: WrittenMotions, sheet: _Sheet, before: Floats) -> Follow
         elif other[a]:
             end = text.units(row[[a]], text.base(row[[a]] - 1, end[None]))[0]
         follow(wanted, end, a, b, into)
-    sheet.write[:, AXES], sheet.number[:, AXES] = into.write, into.number
+    literals.write[:, AXES], literals.number[:, AXES] = into.write, into.number
     return into
 
 
@@ -199,7 +199,7 @@ def _reached(motions: WrittenMotions, start: Floats) -> Floats:
     return np.where(same[:, None] & np.isnan(wanted), behind, wanted)
 
 
-def _closed(motions: WrittenMotions, sheet: _Sheet) -> Bools:
+def _closed(motions: WrittenMotions, literals: _Literals) -> Bools:
     """(M, 3) the axes in which a full circle ends where it starts."""
     plan, closed = motions.plan, np.zeros((len(motions), 3), dtype=bool)
     with np.errstate(invalid="ignore"):
@@ -210,13 +210,15 @@ def _closed(motions: WrittenMotions, sheet: _Sheet) -> Bools:
     apart = np.abs(motions.text.units(row, plan.position[circles]) - motions.text.units(row, before))
     axes = PLANES[motions.places.plane[row], :2]
     near = np.take_along_axis(apart, axes, axis=1)
-    step = 10.0 ** -np.take_along_axis(sheet.decimals[circles, AXES], axes, axis=1)
+    step = 10.0 ** -np.take_along_axis(literals.decimals[circles, AXES], axes, axis=1)
     both = (near <= 0.5 * step).all(axis=1)
     closed[circles[both, None], axes[both]] = True
     return closed
 
 
-def _orientations(motions: WrittenMotions, sheet: _Sheet, before: Floats) -> tuple[dict[int, str], Floats]:
+def _orientations(
+    motions: WrittenMotions, literals: _Literals, before: Floats
+) -> tuple[dict[int, str], Floats]:
     """Follows the words of the orientations from where they are; gives rows whose orientation has no words, and where
     the words are after the motions."""
     path, places, row = motions.path, motions.places, motions.row
@@ -248,7 +250,7 @@ def _orientations(motions: WrittenMotions, sheet: _Sheet, before: Floats) -> tup
         np.where(motions.own[:, None], source, np.nan),
         own,
         relative,
-        sheet.decimals[:, TURNED],
+        literals.decimals[:, TURNED],
         motions.fixed | (orient < 0),
         np.zeros(values.shape, dtype=bool),
         places.turned_before[row],
@@ -264,11 +266,11 @@ def _orientations(motions: WrittenMotions, sheet: _Sheet, before: Floats) -> tup
                 follow_whole(wanted, start, a, b, into, not orientation.angles)
             else:
                 follow(wanted, start, a, b, into)
-    sheet.write[:, TURNED], sheet.number[:, TURNED] = into.write, into.number
+    literals.write[:, TURNED], literals.number[:, TURNED] = into.write, into.number
     return held, into.end[-1]
 
 
-def _arcs(motions: WrittenMotions, ends: Followed, sheet: _Sheet) -> tuple[Bools, Bools]:
+def _arcs(motions: WrittenMotions, ends: Followed, literals: _Literals) -> tuple[Bools, Bools]:
     """Fills the columns of the arcs; (M,) those whose R is replaced by I J K, and those that cannot be stated."""
     path, places, text, plan = motions.path, motions.places, motions.text, motions.plan
     convert, bad = np.zeros(len(motions), dtype=bool), np.zeros(len(motions), dtype=bool)
@@ -307,14 +309,14 @@ def _arcs(motions: WrittenMotions, ends: Followed, sheet: _Sheet) -> tuple[Bools
         text.turns[row],
         np.where(np.isnan(own[:, :3]), text.modal[row, CENTRE], text.relative[row, CENTRE]),
         own,
-        sheet.decimals[np.ix_(m, columns)],
+        literals.decimals[np.ix_(m, columns)],
         np.nan_to_num(np.abs(ends.start[m] - before)).max(axis=1),
     )
     written: WrittenArcs = write_arcs(arcs)
-    sheet.write[np.ix_(m, columns)] = written.write
-    sheet.number[np.ix_(m, columns)] = written.number
-    sheet.decimals[np.ix_(m, columns)] = written.decimals
-    sheet.write[m[written.convert], RADIUS] = False
+    literals.write[np.ix_(m, columns)] = written.write
+    literals.number[np.ix_(m, columns)] = written.number
+    literals.decimals[np.ix_(m, columns)] = written.decimals
+    literals.write[m[written.convert], RADIUS] = False
     convert[m], bad[m] = written.convert, written.bad
     return convert, bad
 
@@ -329,30 +331,30 @@ def _above_plane(motions: WrittenMotions) -> Bools:
     return above
 
 
-def _no_empty_block(motions: WrittenMotions, sheet: _Sheet, ends: Followed) -> None:
+def _no_empty_block(motions: WrittenMotions, literals: _Literals, ends: Followed) -> None:
     """An inserted block without words would be no motion: it gets X."""
-    empty = np.flatnonzero(~motions.own & ~sheet.write.any(axis=1))
+    empty = np.flatnonzero(~motions.own & ~literals.write.any(axis=1))
     relative = motions.text.modal[motions.row[empty], 0]
-    sheet.write[empty, 0] = True
-    sheet.number[empty, 0] = np.where(relative, 0.0, ends.end[empty, 0])
+    literals.write[empty, 0] = True
+    literals.number[empty, 0] = np.where(relative, 0.0, ends.end[empty, 0])
 
 
 def _literals(
-    places: SourceMapPart, text: ProgrammedWords, motions: WrittenMotions, sheet: _Sheet, present: Bools
+    places: SourceMapPart, text: ProgrammedWords, motions: WrittenMotions, literals: _Literals, present: Bools
 ) -> Edits:
     """The numbers that are replaced where they are."""
-    m, column = np.nonzero(sheet.write & present)
+    m, column = np.nonzero(literals.write & present)
     word = text.word[motions.row[m], column]
     words = places.text.words
-    texts, ends = fixed(sheet.number[m, column], sheet.decimals[m, column])
+    texts, ends = fixed(literals.number[m, column], literals.decimals[m, column])
     return Edits(np.zeros(len(m), dtype=np.int8), words.start[word], words.stop[word], texts, ends)
 
 
-def _texts(sheet: _Sheet, missing: Bools) -> dict[int, dict[int, bytes]]:
+def _texts(literals: _Literals, missing: Bools) -> dict[int, dict[int, bytes]]:
     """Motion -> column -> the number of a word that is not there yet."""
     found: dict[int, dict[int, bytes]] = {}
     m, column = np.nonzero(missing)
-    texts, ends = fixed(sheet.number[m, column], sheet.decimals[m, column])
+    texts, ends = fixed(literals.number[m, column], literals.decimals[m, column])
     bounds = ends.tolist()
     for k, (i, j) in enumerate(zip(m.tolist(), column.tolist(), strict=True)):
         found.setdefault(i, {})[j] = texts[bounds[k] : bounds[k + 1]]

@@ -91,12 +91,12 @@ def write_arcs(arcs: ArcsToWrite) -> WrittenArcs:
     # Beyond 120 deg the middle moves by more than the radius does.
     decimals[:, 3] += by_radius & (arcs.sweep > np.radians(120.0))
 
-    number, write = _kept(wanted, arcs.own, decimals)
+    number, write = _rewritten(wanted, arcs.own, decimals)
     # Rounded centres and points leave radii that differ, or another way: a digit more where that counts.
     off, unequal = _missed(arcs, number, through, by_radius)
     finer = ~by_radius & ((off > NEAR) | (unequal > 0.5))
     decimals[finer, :3] += 1
-    kept = _kept(wanted, np.where(write, np.nan, arcs.own), decimals)
+    kept = _rewritten(wanted, np.where(write, np.nan, arcs.own), decimals)
     number[finer], write[finer] = (part[finer] for part in kept)
     # An absent word is zero (or inherits): it is written where that is not meant.
     default = np.where(arcs.relative, 0.0, arcs.start)
@@ -114,7 +114,7 @@ def _well(sweep: Floats) -> Bools:
     return np.asarray((sweep <= WELL[0]) | ((sweep >= WELL[1]) & (sweep <= WELL[2])))
 
 
-def _kept(wanted: Floats, own: Floats, decimals: Ints) -> tuple[Floats, Bools]:
+def _rewritten(wanted: Floats, own: Floats, decimals: Ints) -> tuple[Floats, Bools]:
     """The numbers, and which of them are rewritten: all that are wanted and are not there."""
     scale = 10.0**decimals
     with np.errstate(invalid="ignore"):

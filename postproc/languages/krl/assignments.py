@@ -286,10 +286,10 @@ def _assigned_frame(
     return UnknownValue("KRL012", f"'{shown(value)}' does not consist of six numbers")
 
 
-def _indexed(run: ExecutionContext, table: bytes, given: bytes, line: int) -> FrameIndex | UnknownValue:
-    value = run.value(given.strip())
+def _indexed(run: ExecutionContext, table: bytes, index: bytes, line: int) -> FrameIndex | UnknownValue:
+    value = run.value(index.strip())
     if not is_number(value) or value != int(value) or value < 0:
-        return UnknownValue("KRL012", f"the number '{shown(given)}' is not a constant")
+        return UnknownValue("KRL012", f"the number '{shown(index)}' is not a constant")
     return numbered_frame(run, table, int(value), line)
 
 

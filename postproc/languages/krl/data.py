@@ -142,11 +142,12 @@ def read_data(result: Declarations, document: Document, file: int) -> None:
 
 
 def _declare(
-    result: Declarations, declaration: Declared, key: bytes, value: bytes, at: int, line: int, span: Span, foreign: bool
+    result: Declarations, declaration: Declared, key: bytes, value: bytes, at: int, line: int, span: Span,
+    in_other_file: bool,
 ) -> None:  # fmt: skip
     root = _root(key)
     result.types[root] = declaration.type
-    if declaration.is_global or foreign:
+    if declaration.is_global or in_other_file:
         result.shared.add(root)
     if root in FRAME_TABLES:
         return
@@ -156,22 +157,22 @@ def _declare(
     elif declaration.type in POINT_TYPES:
         if value:
             point = read_point(value, at, span.file, line)
-            if isinstance(point, KrlTarget) and (declaration.is_global or foreign):
+            if isinstance(point, KrlTarget) and (declaration.is_global or in_other_file):
                 point = point._replace(locked="it is GLOBAL, other programs may use it")
-            _add(result, key, point, span, foreign)
+            _add(result, key, point, span, in_other_file)
     elif value.startswith(b"{") and identifiers(value):
         _members(result, root, key[len(root) :], value, line)
     elif (
         value
         and declaration.type in SCALARS
-        and (declaration.is_constant or _keeps_number(root, declaration, foreign))
+        and (declaration.is_constant or _keeps_number(root, declaration, in_other_file))
     ):
-        _add(result, key, _constant(value), span, foreign)
+        _add(result, key, _constant(value), span, in_other_file)
 
 
-def _keeps_number(root: bytes, declaration: Declared, foreign: bool) -> bool:
+def _keeps_number(root: bytes, declaration: Declared, in_other_file: bool) -> bool:
     """Whether nothing outside of the module assigns a number."""
-    return root.startswith(DEFAULTS) if foreign else not declaration.is_global
+    return root.startswith(DEFAULTS) if in_other_file else not declaration.is_global
 
 
 def _members(result: Declarations, root: bytes, path: bytes, value: bytes, line: int, depth: int = 0) -> None:
@@ -197,13 +198,13 @@ def _constant(text: bytes) -> Value:
     return evaluate(text, lambda name, path: None)
 
 
-def _add(result: Declarations, key: bytes, value: Value, span: Span, foreign: bool) -> None:
+def _add(result: Declarations, key: bytes, value: Value, span: Span, in_other_file: bool) -> None:
     root = _root(key)
     if key in result.declared:
-        if foreign and result.values[root].get(key[len(root) :]) == value:
+        if in_other_file and result.values[root].get(key[len(root) :]) == value:
             return
         value = UnknownValue("KRL019", f"{key.decode('latin-1')} is declared twice in the .dat")
-    elif not foreign:
+    elif not in_other_file:
         result.lines[key] = span
     result.declared.add(key)
     result.values.setdefault(root, {})[key[len(root) :]] = value
@@ -239,11 +240,11 @@ def at_the_start(
         if root not in components:
             fixed[root] = entry
             continue
-        changing[root] = {path: _kept(value, components[root]) for path, value in entry.items()}
+        changing[root] = {path: _preserved(value, components[root]) for path, value in entry.items()}
     return fixed, changing
 
 
-def _kept(value: Value, assigned: set[bytes]) -> Value:
+def _preserved(value: Value, assigned: set[bytes]) -> Value:
     why = UnknownValue("KRL002", "the program does not preserve its value in the .dat")
     if (
         not isinstance(value, KrlTarget)

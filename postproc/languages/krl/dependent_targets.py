@@ -95,23 +95,23 @@ class DependentTargets:
             self._inexact[row] = any(abs(value) > EXACT for value in last)
             self.deviation[row] = last
 
-    def again(self, way: Bools) -> Bools:
-        """(N,) rows to be written for the sake of the row before; ``way`` (N,): arcs that are planned otherwise."""
-        arcs = np.zeros(len(way), dtype=bool)
+    def again(self, path_changes: Bools) -> Bools:
+        """(N,) rows to be written for the sake of the row before; ``path_changes`` (N,): arcs planned otherwise."""
+        arcs = np.zeros(len(path_changes), dtype=bool)
         known = [row for row in self.task.places.arcs if np.isfinite(self.task.path.arcs.sweep[row])]
         arcs[known] = True
         # Where an arc with CA ends follows from where it starts.
-        before = np.zeros(len(way), dtype=bool)
+        before = np.zeros(len(path_changes), dtype=bool)
         before[1:] = self._inexact[:-1] & self.task.has_angle[1:]
-        moves = way | self.touched | before | (self.task.inserted > 0)
+        moves = path_changes | self.touched | before | (self.task.inserted > 0)
         return np.asarray(self.completed.any(axis=1) | self.renewed | (arcs & moves & ~self._refused))
 
 
-def _deviation(components: Components, wanted: Floats, kept: Bools) -> Floats:
+def _deviation(components: Components, wanted: Floats, unchanged: Bools) -> Floats:
     """(K, 6) what is written less what the program had: zero where its literal stays."""
     scale = 10.0**components.decimals
     rounded = np.rint(wanted * scale) / scale
-    return np.where(kept & (components.start >= 0), 0.0, _wrapped(rounded - components.own))
+    return np.where(unchanged & (components.start >= 0), 0.0, _wrapped(rounded - components.own))
 
 
 def _wrapped(difference: Floats) -> Floats:

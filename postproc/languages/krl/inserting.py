@@ -38,8 +38,8 @@ _WORD = re.compile(rb"[A-Za-z_]+")
 
 def insertions(task: KrlWritePlan, among: Ints) -> Iterator[Edits]:
     """The edits that insert motions of the plan before rows (K,) that follow each other."""
-    first, behind = int(task.own[among[0]] - task.inserted[among[0]]), int(task.own[among[-1]])
-    chosen = first + np.flatnonzero(task.plan.role[first:behind] != Role.ORIGINAL)
+    first, after = int(task.own[among[0]] - task.inserted[among[0]]), int(task.own[among[-1]])
+    chosen = first + np.flatnonzero(task.plan.role[first:after] != Role.ORIGINAL)
     source = task.documents[0]
     for at in range(0, len(chosen), BLOCK):
         block = chosen[at : at + BLOCK]
@@ -66,7 +66,7 @@ def insertions(task: KrlWritePlan, among: Ints) -> Iterator[Edits]:
 
 
 def _line(
-    task: KrlWritePlan, motion: int, components: Components, wanted: Floats, kept: Bools, k: int
+    task: KrlWritePlan, motion: int, components: Components, wanted: Floats, unchanged: Bools, k: int
 ) -> bytes:
     """The line of a motion of the plan, in numbers, with the words of its source; a transition move goes straight.
 
@@ -79,7 +79,7 @@ def _line(
     found = _WORD.match(raw, at)
     word = found[0] if found else b"LIN"
     relative, arc, variable = places.relative.get(row), places.arcs.get(row), places.variables.get(row)
-    texts = task.texts(components, wanted, kept, k)
+    texts = task.texts(components, wanted, unchanged, k)
     words = carried(raw[start:stop]) if variable is None else variable.words
     if b"E" in words.upper() and (relative is not None or task.plan.external is not None):
         words = _intermediate_points(
@@ -91,33 +91,33 @@ def _line(
         stop = stop if relative.reference is None else relative.reference.stop
     if arc is not None and arc.angle is not None:
         stop = arc.angle.stop
-    behind = raw[stop:end]
+    after = raw[stop:end]
     if task.plan.role[motion] == Role.TRANSITION:
-        word, behind = _transition_words(task, row, word, behind, bool(task.plan.flows[motion]))
+        word, after = _transition_words(task, row, word, after, bool(task.plan.flows[motion]))
     elif arc is not None:
         via = half_way(task.plan, np.array([motion]))[0].tolist()
         target = aggregate([fixed_one(value, int(task.least[0])) for value in via], b"") + b"," + target
-    if task.plan.flows[motion] and _APPROXIMATION.search(behind) is None:
-        behind += _APPROXIMATION_OF.get(word[:1].upper(), APPROXIMATION)
+    if task.plan.flows[motion] and _APPROXIMATION.search(after) is None:
+        after += _APPROXIMATION_OF.get(word[:1].upper(), APPROXIMATION)
     indent = raw[raw.rfind(b"\n", 0, at) + 1 : at]
     if row in task.path.constraints.spline_headers:
         above = task.documents[0].line(task.path.constraints.spline_headers[row])
         indent = above[: len(above) - len(above.lstrip(b" \t"))]
-    return (indent if not indent.strip() else b"") + word + b" " + target + behind + newline
+    return (indent if not indent.strip() else b"") + word + b" " + target + after + newline
 
 
 def _transition_words(
-    task: KrlWritePlan, row: int, word: bytes, behind: bytes, flows: bool
+    task: KrlWritePlan, row: int, word: bytes, after: bytes, flows: bool
 ) -> tuple[bytes, bytes]:
     """The word of a transition move, and what is after its target: the conditions of its source, and the approximation
     of that where it ``flows``.  Before a spline block it is a LIN, or where the block has conditions an SLIN with
     them."""
     source, entered = task.documents[0], task.path.constraints.spline_headers.get(row)
-    own = _with_clause(behind) if word[:1] in b"Ss" else b""
+    own = _with_clause(after) if word[:1] in b"Ss" else b""
     if entered is not None:
         own = _joined(_conditions(source, entered), own)
     spline = bool(own) if entered is not None else word[:1] in b"Ss"
-    approximations = _APPROXIMATION.findall(behind) if flows and entered is None else []
+    approximations = _APPROXIMATION.findall(after) if flows and entered is None else []
     name = b"slin" if word.islower() else b"SLIN"
     return name[0 if spline else 1 :], b"".join(b" " + part for part in (own, *approximations) if part)
 
@@ -205,7 +205,7 @@ def _copied(task: KrlWritePlan, block: Ints, rows: Ints, start: Ints) -> Bools:
 
 
 def _copies(
-    task: KrlWritePlan, rows: Ints, components: Components, wanted: Floats, kept: Bools, line_start: Ints
+    task: KrlWritePlan, rows: Ints, components: Components, wanted: Floats, unchanged: Bools, line_start: Ints
 ) -> Edits:
     """The lines of segments (K,): the bytes of their source between its literals, and the numbers.
 
@@ -219,7 +219,7 @@ def _copies(
     )
     end = task.places.motion[rows, 3]
     # What stays is taken from the text, what does not from ``texts``.
-    new = ~np.take_along_axis(kept, order, axis=1)
+    new = ~np.take_along_axis(unchanged, order, axis=1)
     numbers, decimals = (
         np.take_along_axis(wanted, order, axis=1),
         np.take_along_axis(components.decimals, order, axis=1),

@@ -228,7 +228,7 @@ def _parts_of(line: bytes) -> tuple[str, bytes, bytes, int, Said, bytes] | None:
     word = first[1].upper() if first else b""
     kind, said = _kind(word, code, at)
     if not code.isascii() and kind in ("other", "goto") and has_foreign_letters(code):
-        kind, said = _strange(word, code, at)
+        kind, said = _nonstandard(word, code, at)
     return kind, word, code, at, said, comment
 
 
@@ -246,7 +246,7 @@ def has_foreign_letters(code: bytes) -> bool:
     return not without_strings(code).isascii()
 
 
-def _strange(word: bytes, code: bytes, at: int) -> tuple[str, Said]:
+def _nonstandard(word: bytes, code: bytes, at: int) -> tuple[str, Said]:
     plain = _GERMAN.sub(lambda found: b"_" * len(found[0]), code)
     if word != b"GOTO" and len(code) <= LONGEST and not has_foreign_letters(plain):
         first = _FIRST.match(plain)

@@ -59,7 +59,7 @@ def _frames(state: ModalState, kind: Kind) -> tuple[int, int]:
 
 def enter_motion(
     run: ExecutionContext, statement: Statement, kind: Kind, operand: Operand, reason: RowRefusal | None, blend: float,
-    way: Arc | None = None, relative: bool = False,
+    arc: Arc | None = None, relative: bool = False,
 ) -> int:  # fmt: skip
     """Adds the row of a motion and brings the state after it.  ``reason``: why it is refused in any case."""
     state, target = run.state, operand.target
@@ -89,8 +89,8 @@ def enter_motion(
             reason = varying(state, stated, values)
     if partial and values is not None and state.point_frames != (state.base, state.tool):
         values = None
-    if values is not None and way is not None:
-        values = (*way.end, *values[3:])
+    if values is not None and arc is not None:
+        values = (*arc.end, *values[3:])
     elif kind == Kind.CIRC and reason is None:
         reason = RowRefusal("KRL009", "its path is not known")
     if reason is None and kind is not Kind.AXIS:
@@ -107,7 +107,7 @@ def enter_motion(
         MotionRow(
             kind, statement.line, extent(statement, operand), values or NAN6, axes or NAN6,
             NAN if kind in (Kind.PTP, Kind.AXIS) else state.steady_feed, *_frames(state, kind), blend,
-            stated, _inherits(stated, relative), path_of(way) if values is not None else NO_ARC,
+            stated, _inherits(stated, relative), path_of(arc) if values is not None else NO_ARC,
             state.orientation, state.arc_frame, external,
         ),
         anchor,

@@ -204,8 +204,8 @@ def index(frame: FrameIndex | UnknownValue) -> int:
     return frame.index if isinstance(frame, FrameIndex) else -1
 
 
-def refusal(unclear: UnknownValue, subject: str, cause: str = "") -> RowRefusal:
-    return RowRefusal(unclear.code, f"{subject}{unclear.message}", cause)
+def refusal(value: UnknownValue, subject: str, cause: str = "") -> RowRefusal:
+    return RowRefusal(value.code, f"{subject}{value.message}", cause)
 
 
 def path_of(arc: Arc | None) -> tuple[float, ...]:

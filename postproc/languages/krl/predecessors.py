@@ -80,17 +80,17 @@ def _sources_of_others(rows: MotionRows, single: Bools) -> Iterable[Source]:
     return others | rows.unfollowed_ends
 
 
-def expanded(rows: MotionRows, sources: Iterable[Source], seen: set[Source] | None = None) -> set[int]:
-    """The rows (and ``START``, ``ELSEWHERE``) among sources, with those after marks; without what ``seen`` has, which
-    takes up all that is found."""
-    seen = set() if seen is None else seen
+def expanded(rows: MotionRows, sources: Iterable[Source], visited: set[Source] | None = None) -> set[int]:
+    """The rows (and ``START``, ``ELSEWHERE``) among sources, with those after marks; without what ``visited`` has,
+    which takes up all that is found."""
+    visited = set() if visited is None else visited
     found: set[int] = set()
     todo = list(sources)
     while todo:
         source = todo.pop()
-        if source in seen:
+        if source in visited:
             continue
-        seen.add(source)
+        visited.add(source)
         if isinstance(source, int):
             found.add(_there(rows, source))
         else:

@@ -162,19 +162,19 @@ class RewrittenLines:
         return {name.upper() for document in self.task.documents for name in _NAME.findall(document.raw)}
 
     def _declared(
-        self, old: bytes, variable: PointVariable, behind: Span, texts: Sequence[bytes]
+        self, old: bytes, variable: PointVariable, after: Span, texts: Sequence[bytes]
     ) -> tuple[bytes, Edit]:
         """A new point in the .dat after the declaration of the old one; equal ones are one."""
-        key = (behind, (variable.name.upper(), *texts))
+        key = (after, (variable.name.upper(), *texts))
         if key not in self._points:
             name = self._new_name(old)
-            document = self.task.documents[behind.file]
+            document = self.task.documents[after.file]
             text = b"DECL " + variable.type + b" " + name + b"=" + aggregate(texts, variable.words)
-            below = document.raw.find(b"\n", behind.stop) + 1
+            below = document.raw.find(b"\n", after.stop) + 1
             at, line = (
                 (below, text + document.newline) if below else (len(document.raw), document.newline + text)
             )
-            self._points[key] = (name, Edit(Span(behind.file, at, at), line))
+            self._points[key] = (name, Edit(Span(after.file, at, at), line))
         return self._points[key]
 
     def _new_name(self, name: bytes) -> bytes:

@@ -122,9 +122,9 @@ def _vectorised_lines(raw: bytes, start: int, stop: int) -> VectorisedLines:
     opening, closing = np.flatnonzero(text == 0x7B), np.flatnonzero(text == 0x7D)
     inside = _IN_NUMBER[text]
     edges = np.flatnonzero(inside[1:] != inside[:-1]) + 1  # a line starts and ends with neither
-    first, behind = edges[0::2], edges[1::2]
+    first, after = edges[0::2], edges[1::2]
     six = np.searchsorted(first, begins)[:, None] + np.arange(6)
-    starts, stops = first[six], behind[six]
+    starts, stops = first[six], after[six]
     word = begins.copy()
     while (blank := text[word] <= 0x20).any():
         word += blank
@@ -165,17 +165,17 @@ def _approximations(text: NDArray[Any], closing: NDArray[Any]) -> tuple[NDArray[
 
 
 def _states(
-    raw: bytes, start: int, behind: NDArray[Any], closing: NDArray[Any]
+    raw: bytes, start: int, after: NDArray[Any], closing: NDArray[Any]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], Floats | None]:
     """S, T and the external axes of the lines, which are between their last angle and the brace."""
-    rows = np.flatnonzero(closing > behind)
+    rows = np.flatnonzero(closing > after)
     if not len(rows):
         none = np.broadcast_to(np.int32(-1), len(closing))
         return none, none, None
     status, turn = np.full(len(closing), -1, np.int32), np.full(len(closing), -1, np.int32)
     rests = [
         raw[a:b]
-        for a, b in zip((behind[rows] + start).tolist(), (closing[rows] + start).tolist(), strict=True)
+        for a, b in zip((after[rows] + start).tolist(), (closing[rows] + start).tolist(), strict=True)
     ]
     number = {rest: i for i, rest in enumerate(dict.fromkeys(rests))}
     known = [_state(rest) for rest in number]

@@ -145,10 +145,16 @@ def _arc_points(task: KrlWritePlan, rows: Ints, wanted: Floats) -> tuple[Floats,
 
 
 def _auxiliary(
-    task: KrlWritePlan, row: int, arc: Auxiliary, said: Via, via: list[float], finer: int, angles: list[bytes]
+    task: KrlWritePlan,
+    row: int,
+    arc: Auxiliary,
+    programmed: Via,
+    via: list[float],
+    finer: int,
+    angles: list[bytes],
 ) -> TargetEdit:
     """The auxiliary point; ``angles``: A, B, C as written, that an own point gets besides (they do not count)."""
-    own, decimals = said[0], [count + finer for count in said[1]]
+    own, decimals = programmed[0], [count + finer for count in programmed[1]]
     steps = [0.5 * 10.0**-count for count in decimals]
     texts = [fixed_one(value, count) for value, count in zip(via, decimals, strict=True)]
     left_out = [i for i in range(3) if arc.start[i] < 0]
@@ -209,24 +215,24 @@ def _users(task: KrlWritePlan, needed: dict[int, list[TargetEdit]]) -> dict[int,
 
 
 def _of_one_text(
-    task: KrlWritePlan, targets: list[TargetEdit], said: dict[Spot, float], lines: RewrittenLines
+    task: KrlWritePlan, targets: list[TargetEdit], written: dict[Spot, float], lines: RewrittenLines
 ) -> list[Edit]:
-    """Edits for the targets that take their numbers from one text; ``said``: what its literals must say.
+    """Edits for the targets that take their numbers from one text; ``written``: what its literals must say.
 
     What wants the same is written once, the first one's in place; the others get points of their own.
     """
     edits: list[Edit] = []
-    shared = len(targets) > 1 or bool(said)
+    shared = len(targets) > 1 or bool(written)
     for target in targets:
         moved = target.moved()
         computed = any(target.start[i] < 0 for i in moved)
-        why = _why_own(task, target, computed, shared, said)
+        why = _why_own(task, target, computed, shared, written)
         if why:
             lines.point(target.row, target.operand, target.variable, target.texts, why, target.via)
             continue
         for i, spot in target.spots():
-            if spot not in said:
-                said[spot] = target.wanted[i] if i in moved else target.own[i]
+            if spot not in written:
+                written[spot] = target.wanted[i] if i in moved else target.own[i]
                 if i in moved:
                     span = Span(spot[0], spot[1], target.stop[i])
                     edits.append(lines.replaced(span, target.texts[i]))
@@ -236,7 +242,7 @@ def _of_one_text(
 
 
 def _why_own(
-    task: KrlWritePlan, target: TargetEdit, computed: bool, shared: bool, said: dict[Spot, float]
+    task: KrlWritePlan, target: TargetEdit, computed: bool, shared: bool, written: dict[Spot, float]
 ) -> str:
     """Why the target cannot be written in place; "" if it can."""
     shown = "its target"
@@ -250,7 +256,7 @@ def _why_own(
         return f"{shown} omits components and is shared by several motions"
     # Half a step and what a double is off by.
     same = all(
-        spot not in said or _apart(said[spot], target.wanted[i], i) <= 1.000001 * target.steps[i]
+        spot not in written or _apart(written[spot], target.wanted[i], i) <= 1.000001 * target.steps[i]
         for i, spot in target.spots()
     )
     return "" if same else f"{shown} is shared by several motions with different corrections"

@@ -54,20 +54,20 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
     table.blend *= MM
     n = len(rows)
     anchor = _sparse((n,), np.int32(-1), {row: at.row for row, at in rows.anchors.items()})
-    given = _given(rows, n)
+    given = _partial_components(rows, n)
     axes = np.array(list(table.axes.values())).reshape(-1, 6) * DEG
     several = _several(table)
-    continues = _kept(continuous(rows, single))
+    continues = _read_only(continuous(rows, single))
     stopped = _stop(table, stopped_motions(rows, continues))
     toolpath = Toolpath(
-        kind=_kept(table.kind),
-        position=_kept(table.position),
-        rotation=_kept(table.rotation),
-        axes=FewRows(np.array(list(table.axes), np.int32), _kept(axes), n),
-        feed=_kept(table.feed),
-        base=_kept(table.base),
-        tool=_kept(table.tool),
-        line=_kept(table.line),
+        kind=_read_only(table.kind),
+        position=_read_only(table.position),
+        rotation=_read_only(table.rotation),
+        axes=FewRows(np.array(list(table.axes), np.int32), _read_only(axes), n),
+        feed=_read_only(table.feed),
+        base=_read_only(table.base),
+        tool=_read_only(table.tool),
+        line=_read_only(table.line),
         frames=used,
         constraints=EditConstraints(
             refused=refused,
@@ -83,16 +83,16 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
             centre=_sparse((n, 3), np.nan, {row: arc[:3] for row, arc in table.ways.items()}, MM),
             normal=_sparse((n, 3), np.nan, {row: arc[3:6] for row, arc in table.ways.items()}),
             sweep=_sparse((n,), np.nan, {row: arc[6] for row, arc in table.ways.items()}, DEG),
-            frame=_kept(table.arc_frame),
+            frame=_read_only(table.arc_frame),
         ),
-        approximation=_kept(table.blend),
+        approximation=_read_only(table.blend),
         comments=tuple(rows.comments),
         continues=continues,
         predecessors=predecessors(rows, continues),
         stops=_stops(rows, table),
-        configuration=Configuration({"status": _kept(table.status), "turn": _kept(table.turn)}),
-        orientation_control=OrientationControl(mode=_kept(table.orientation)),
-        external=_kept(table.external),
+        configuration=Configuration({"status": _read_only(table.status), "turn": _read_only(table.turn)}),
+        orientation_control=OrientationControl(mode=_read_only(table.orientation)),
+        external=_read_only(table.external),
     )
     found = None if table.spots is None else _places(rows, table, table.spots)
     return (
@@ -125,7 +125,7 @@ def _places(rows: MotionRows, table: MotionTable, spots: Spots) -> KrlSourceMap:
     )
 
 
-def _kept(array: NDArray[Any]) -> NDArray[Any]:
+def _read_only(array: NDArray[Any]) -> NDArray[Any]:
     """Read-only, so that it need not be copied."""
     array.setflags(write=False)
     return array
@@ -139,10 +139,10 @@ def _sparse(
         return np.broadcast_to(blank, shape)
     array = np.full(shape, blank)
     array[list(filled)] = list(filled.values())
-    return _kept(array * unit)
+    return _read_only(array * unit)
 
 
-def _given(rows: MotionRows, n: int) -> Floats:
+def _partial_components(rows: MotionRows, n: int) -> Floats:
     known = {
         row: [np.nan if value is None else value for value in at.partial_target]
         for row, at in rows.anchors.items()
@@ -249,7 +249,7 @@ def _correctable_orientations(table: MotionTable) -> Bools:
     )
     if not keep.any():
         return np.broadcast_to(True, keep.shape)
-    return _kept(~(keep | np.append(keep[1:], False)))
+    return _read_only(~(keep | np.append(keep[1:], False)))
 
 
 def _stop(table: MotionTable, blends: dict[int, float]) -> dict[int, float]:
@@ -280,7 +280,7 @@ def _stops(rows: MotionRows, table: MotionTable) -> Bools:
     """(N,) motions at whose end the controller comes to rest."""
     stops = np.equal(table.blend, 0.0)
     stops[list(rows.passing)] = False
-    return _kept(stops)
+    return _read_only(stops)
 
 
 def _number_texts(rows: MotionRows, table: MotionTable, spots: Spots) -> None:

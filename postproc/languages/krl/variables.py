@@ -109,7 +109,7 @@ class Variables:
 
     def _join(self, name: bytes, path: bytes, left: PersistentMap, right: PersistentMap) -> Fact:
         own: Fact | None = left.get(path)
-        a, b = (_found(side, path) for side in (left, right))
+        a, b = (_fact_at(side, path) for side in (left, right))
         if own is not None and isinstance(own.value, UnknownValue) and not isinstance(own.value, FrameEntry):
             return own
         if a is not None and b is not None:
@@ -141,17 +141,17 @@ class Variables:
     def _fact(self, facts: VariableFacts, name: bytes, path: bytes) -> Fact | None:
         entry = facts.names.get(name)
         if entry is not None:
-            return _found(entry, path)
+            return _fact_at(entry, path)
         self.asked.add(name)
         values = self.fixed.get(name)
         if values is None:
             return None if facts.unknown is None else Fact(facts.unknown, 0)
         if path in values:
             return Fact(values[path], 0)
-        return _found(self._entry(values, 0), path)
+        return _fact_at(self._entry(values, 0), path)
 
 
-def _found(entry: PersistentMap, path: bytes) -> Fact | None:
+def _fact_at(entry: PersistentMap, path: bytes) -> Fact | None:
     """What is known of a path: itself, or as a component of what is before it."""
     fact: Fact | None = entry.get(path)
     if fact is not None:

@@ -82,7 +82,7 @@ class KrlWritePlan:
         self.is_relative[list(self.places.relative)] = True
 
     @cached_property
-    def _given(self) -> NDArray[Any] | None:
+    def _source_rows(self) -> NDArray[Any] | None:
         """(N, 6) the row whose text gives a component: the row itself, or that which it takes it from; None: always
         the row itself."""
         if not self.places.inherits.any():
@@ -121,11 +121,11 @@ class KrlWritePlan:
         literals that there are.
         """
         places, columns = self.places, np.arange(6)
-        if self._given is None:
+        if self._source_rows is None:
             start, stop, file = places.start[rows], places.stop[rows], places.file[rows]
             start = np.where(self.is_relative[rows, None], -1, start)
         else:
-            given = self._given[rows]
+            given = self._source_rows[rows]
             start, stop, file = (part[given, columns] for part in (places.start, places.stop, places.file))
             # The literals of a CA are not the end that others build on.
             start = np.where(self.has_angle[given] & (given != rows[:, None]) & (columns < 3), -1, start)
@@ -163,14 +163,14 @@ class KrlWritePlan:
         wanted = self.wanted(rows, said.own, self.plan.position[there], self.plan.rotation[there])
         return said, wanted, said.unchanged(wanted)
 
-    def texts(self, components: Components, wanted: Floats, kept: Bools, k: int) -> list[bytes]:
+    def texts(self, components: Components, wanted: Floats, unchanged: Bools, k: int) -> list[bytes]:
         """The six components of the ``k``-th motion of ``wanted`` (K, 6) [mm, deg] as they are to be written: as they
-        are, where they stay: ``kept`` (K, 6)."""
+        are, where they stay: ``unchanged`` (K, 6)."""
         return [
             self.documents[components.file[k, i]]
             .raw[int(components.start[k, i]) : int(components.stop[k, i])]
             .lstrip(b"+")
-            if kept[k, i] and components.start[k, i] >= 0
+            if unchanged[k, i] and components.start[k, i] >= 0
             else fixed_one(float(wanted[k, i]), int(components.decimals[k, i]))
             for i in range(6)
         ]

@@ -37,18 +37,18 @@ def edit_targets(program: Program, plan: Plan, writing: WritingSettings) -> Edit
 
 
 def _parts(
-    task: KrlWritePlan, touched: Bools, way: Bools, held: dict[int, Finding]
+    task: KrlWritePlan, touched: Bools, path_changes: Bools, refused: dict[int, Finding]
 ) -> Iterator[Iterable[Edit]]:
-    """The edits, nearly all in the order of their places; ``held`` takes up the rows that cannot move as planned."""
+    """The edits, nearly all in the order of their places; ``refused`` takes up the rows that cannot move as planned."""
     private = _private(task)
     plain = touched & _plain(task, private)
     chain = DependentTargets(task, touched)
     chain.follow()
-    again = (touched & ~plain) | chain.again(way)
+    again = (touched & ~plain) | chain.again(path_changes)
     partial = again & _partial(task, private)
     single, not_moved = single_edits(task, np.flatnonzero(again & ~partial), chain.completed)
-    held.update(not_moved)
-    if held:
+    refused.update(not_moved)
+    if refused:
         return
 
     def written(block: slice) -> Edits:
@@ -86,11 +86,11 @@ def _touched(task: KrlWritePlan) -> tuple[Bools, Bools]:
     return touched, way
 
 
-def _refuse_forbidden(task: KrlWritePlan, touched: Bools, way: Bools) -> None:
+def _refuse_forbidden(task: KrlWritePlan, touched: Bools, path_changes: Bools) -> None:
     path = task.path
     fixed = path.constraints
     fixed_rows = {row for row in (*fixed.refused, *fixed.locked) if touched[row]}
-    fixed_rows |= {row for row in fixed.refused if way[row]}
+    fixed_rows |= {row for row in fixed.refused if path_changes[row]}
     fixed_rows |= set(np.flatnonzero(touched & (path.kind == Kind.AXIS)).tolist())
     if fixed_rows:
         raise ValueError(f"motions that cannot be corrected are moved: rows {sorted(fixed_rows)[:5]}")

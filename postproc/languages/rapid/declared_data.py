@@ -68,8 +68,8 @@ class DeclaredData:
             self.lines[one.name] = one.start
             if twice:
                 self._values[one.name] = UnknownData(f"{_shown(one.name)} is declared twice")
-        for unclear in module.unclear:
-            for name in unclear.names & (self._declarations.keys() | self._targets.keys()):
+        for unread_statements in module.unread_statements:
+            for name in unread_statements.names & (self._declarations.keys() | self._targets.keys()):
                 self._values[name] = UnknownData(f"a line with {_shown(name)} is not understood")
 
     def __contains__(self, name: bytes) -> bool:
@@ -165,8 +165,8 @@ class Usage:
         self._copying = {r.name for r in module.routines if not any(p.mode for p in r.parameters)}
         for one in module.declarations:
             self._expressions(one.value, one.extent)
-        for unclear in module.unclear:
-            self.read |= unclear.names
+        for unread_statements in module.unread_statements:
+            self.read |= unread_statements.names
         aside = [routine.name for routine in module.routines if routine.kind == b"TRAP"]
         for routine in module.routines:
             self._called, self._set, self._mentioned = set(), set(), set()

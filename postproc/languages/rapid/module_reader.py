@@ -73,8 +73,11 @@ def _structure(document: Document, module: Module, flow: Propagation) -> list[Fi
         elif flow.is_unclear(routine):
             message = f"{name} is the name of several routines, or a label of it is missing or there twice"
             found.append(_finding(document, "RAP007", message, routine.start))
-    unclear = [*module.unclear, *(one for one in flow.unread.values() if one.start not in flow.facts)]
-    texts = [(document.raw[one.start : one.stop], one.start) for one in unclear]
+    unread_statements = [
+        *module.unread_statements,
+        *(one for one in flow.unread.values() if one.start not in flow.facts),
+    ]
+    texts = [(document.raw[one.start : one.stop], one.start) for one in unread_statements]
     return found + not_understood(texts, partial(_finding, document, "RAP001"))
 
 

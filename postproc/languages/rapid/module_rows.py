@@ -100,16 +100,16 @@ class ModuleRows:
             return (ELSEWHERE,)
         return tuple(sorted({self._row(one) for one in expanded(places, set())}))
 
-    def starts_of(self, row: int, seen: set[Meeting]) -> list[int]:
-        """The rows among the sources of a row, with those after meetings that are not in ``seen``."""
+    def starts_of(self, row: int, visited: set[Meeting]) -> list[int]:
+        """The rows among the sources of a row, with those after meetings that are not in ``visited``."""
         at = self.fact_of[row]
         if self.first[at] < row < self.never_from:
             return [row - 1]
-        return self.rows_of(self.facts[at].before, seen)
+        return self.rows_of(self.facts[at].before, visited)
 
-    def rows_of(self, sources: Iterable[Source], seen: set[Meeting]) -> list[int]:
-        """The rows among offsets of motions, with those after meetings that are not in ``seen``."""
-        return sorted({row for one in expanded(sources, seen) if (row := self._row(one)) >= 0})
+    def rows_of(self, sources: Iterable[Source], visited: set[Meeting]) -> list[int]:
+        """The rows among offsets of motions, with those after meetings that are not in ``visited``."""
+        return sorted({row for one in expanded(sources, visited) if (row := self._row(one)) >= 0})
 
     def _row(self, source: int) -> int:
         """The row of the motion at an offset; one that is in no row ends elsewhere."""

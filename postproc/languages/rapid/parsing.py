@@ -78,7 +78,7 @@ class ModuleParser(RapidExpressionParser):
             elif word in (b"RECORD", b"ALIAS"):
                 self._type()
             else:
-                module.unclear.append(self._skip())
+                module.unread_statements.append(self._skip())
         module.remarks += self._drain(len(self.raw))
         if self._named is not None:
             module.targets = self._named.targets.starts
@@ -99,7 +99,7 @@ class ModuleParser(RapidExpressionParser):
             if self.module.name_stop < 0:
                 self.module.name_stop = self.tokens.before
         except SyntaxProblem:
-            self.module.unclear.append(self._skip(start))
+            self.module.unread_statements.append(self._skip(start))
 
     def _item(self) -> None:
         """A declaration or a routine."""
@@ -117,11 +117,11 @@ class ModuleParser(RapidExpressionParser):
             try:
                 self.module.declarations.append(self._declaration(start))
             except SyntaxProblem:
-                self.module.unclear.append(self._skip(start))
+                self.module.unread_statements.append(self._skip(start))
         elif word in (b"PROC", b"FUNC", b"TRAP"):
             self._routine(local)
         else:
-            self.module.unclear.append(self._skip(start))
+            self.module.unread_statements.append(self._skip(start))
 
     def _type(self) -> None:
         start, word = self.next.start, self.take().text
@@ -137,7 +137,7 @@ class ModuleParser(RapidExpressionParser):
             self.take()
             self.module.records[name] = tuple(parts)
         except SyntaxProblem:
-            self.module.unclear.append(self._skip(start))
+            self.module.unread_statements.append(self._skip(start))
 
     def _routine(self, local: bool) -> None:
         start, kind = self.next.start, self.take().text

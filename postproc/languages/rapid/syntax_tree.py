@@ -300,14 +300,14 @@ class RapidRoutine:
 @dataclass(slots=True)
 class Module:
     """What a file declares.  ``records``: type -> (component, type); ``name_stop``: where the line of MODULE goes on,
-    -1 without one; ``unclear``: places between routines that are not understood; ``targets``: name -> offset of a
-    declaration that is in no other list."""
+    -1 without one; ``unread_statements``: places between routines that are not understood; ``targets``: name -> offset
+    of a declaration that is in no other list."""
 
     declarations: list[DataDeclaration] = field(default_factory=list)
     routines: list[RapidRoutine] = field(default_factory=list)
     records: dict[bytes, tuple[tuple[bytes, bytes], ...]] = field(default_factory=dict)
     remarks: list[Remark] = field(default_factory=list)
-    unclear: list[NotUnderstood] = field(default_factory=list)
+    unread_statements: list[NotUnderstood] = field(default_factory=list)
     name_stop: int = -1
     unclosed: int = -1
     targets: Mapping[bytes, int] = field(default_factory=dict)

@@ -200,14 +200,14 @@ def _position(raw: bytes, head: re.Match[bytes], stop: int) -> tuple[TpPosition,
         at = after if comma is None else comma.end()
 
 
-def _common_group(found: re.Match[bytes]) -> PositionGroup:
-    values = [float(text) for text in found.group(4, 5, 6, 7, 8, 9)]
+def _common_group(match: re.Match[bytes]) -> PositionGroup:
+    values = [float(text) for text in match.group(4, 5, 6, 7, 8, 9)]
     return PositionGroup(
         1,
-        {b"UF": int(found[1]), b"UT": int(found[2])},
-        found[3][1:-1],
+        {b"UF": int(match[1]), b"UT": int(match[2])},
+        match[3][1:-1],
         dict(zip(CARTESIAN, values, strict=True)),
-        {name: found.span(place) for place, name in enumerate(CARTESIAN, 4)},
+        {name: match.span(place) for place, name in enumerate(CARTESIAN, 4)},
     )
 
 
