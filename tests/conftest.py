@@ -6,10 +6,19 @@ import csv
 import json
 import os
 import signal
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+
+if sys.dont_write_bytecode:
+    # Hundreds of processes load the package: it is compiled once, and no file is written beside a source.
+    sys.dont_write_bytecode = False
+    sys.pycache_prefix = str(Path(__file__).parent.parent / ".pytest_cache" / "bytecode")
+    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 import valid_results  # before what it checks
 from tiers import choose_profile, mark_samples
 
