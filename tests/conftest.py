@@ -20,7 +20,7 @@ if sys.dont_write_bytecode:
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 import valid_results  # before what it checks
-from tiers import choose_profile, mark_samples
+from tiers import choose_profile, mark_samples, stock_first
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is there
 
@@ -40,6 +40,7 @@ def pytest_configure(config):
 @pytest.hookimpl(tryfirst=True)  # before the marks are asked for
 def pytest_collection_modifyitems(items):
     mark_samples(items)
+    stock_first(items)
 
 
 @pytest.hookimpl(wrapper=True)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
-from tiers import FAST, examples, in_sample
+from tiers import FAST, STOCK, examples, in_sample
 
 import postproc
 
@@ -45,3 +45,9 @@ def test_every_room_has_tests_in_the_fast_tier(request):
     rooms = {path.parent.name for path in Path(postproc.__file__).parent.glob("*/__init__.py")}
     assert len(rooms) > 10
     assert rooms <= tested
+
+
+def test_the_first_tests_are_those_that_simulate_a_stock(request):
+    first = [item.path.name.startswith(STOCK) for item in request.session.items]
+    assert first == sorted(first, reverse=True)
+    assert all(any(Path(__file__).parent.glob(f"{start}*.py")) for start in STOCK)

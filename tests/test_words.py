@@ -39,7 +39,8 @@ FORMER = re.compile(
 ALLOWED = (
     r"link (?:geometry|gravity|compliance)",  # names of effects
     r"links?(?= \[mm\]| lengths?\b| geometry\b| before\b| that a joint\b)|bearings and links|URDF link",  # of an arm
-    r"(?:parent|its|base|tip|next) link|the links?\b|rigid links|[Ll]inks and (?:axis )?limits|[Ll]ink lengths|k the link",
+    r"(?:parent|its|base|tip|next) link|the links?\b|rigid links|[Ll]inks and (?:axis )?limits|k the link",
+    r"[Ll]ink lengths",
     r"of links\b|links that|A link between|a link that grows|with links",
     r"symbolic link|[Aa] link in the place|that is a link|no link is|it links every|links of worst",  # files, pages
     r"expected\sby chance|is by chance",  # statistics

@@ -47,6 +47,16 @@ def mark_samples(items: list[pytest.Item]) -> None:
                 item.add_marker(pytest.mark.slow)
 
 
+STOCK = ("test_engage", "test_part_")
+"""Starts of the names of files whose tests simulate a stock."""
+
+
+def stock_first(items: list[pytest.Item]) -> None:
+    """Puts the tests that simulate a stock before all others, else in their order: its loops are compiled at the first
+    call, which takes long, by the one process that gets the first tests, and the others load them."""
+    items.sort(key=lambda item: not item.path.name.startswith(STOCK))
+
+
 def in_sample(k: int, of: int, count: int) -> bool:
     """Whether the ``k``-th of so many is one of ``count`` that lie evenly from the first to the last."""
     if count >= of or of == 1:
