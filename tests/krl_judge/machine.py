@@ -26,6 +26,7 @@ from .values import (
     copied,
     is_set,
     new_cell,
+    restore,
 )
 
 Inputs = Mapping[int, tuple[bool, ...]]
@@ -42,13 +43,15 @@ class _Return(Exception):
 
 @dataclass
 class Memory:
-    """What outlives a run: the variables of the .dat and of $config.dat, BASE_DATA and TOOL_DATA."""
+    """What outlives a run: the variables of the .dat and of $config.dat, BASE_DATA and TOOL_DATA; ``words``: the types
+    that ENUM declares."""
 
     cells: dict[str, Cell]
     structures: dict[str, dict[str, str]]
+    words: set[str] = field(default_factory=set)
 
     def copy(self) -> Memory:
-        return Memory({name: copied(cell) for name, cell in self.cells.items()}, self.structures)
+        return Memory({name: copied(cell) for name, cell in self.cells.items()}, self.structures, self.words)
 
 
 @dataclass
@@ -204,9 +207,9 @@ class Machine(Events):
                 at = self.step(scope, routine.lines[at], at)
         except _Return as back:
             if routine.result:
-                result = Cell(routine.result)
+                result = new_cell(routine.result, self.memory.structures)
                 assign(result, back.value)
-                return result.value
+                return content(result)
             return None
         finally:
             self.scopes.pop()
@@ -220,6 +223,9 @@ class Machine(Events):
             pass
         of = reader.name()
         structures = self.memory.structures
+        if of == "ENUM":
+            self.memory.words.add(reader.name())
+            return
         if of == "STRUC":
             name = reader.name()
             structures[name] = components = {}
@@ -231,7 +237,7 @@ class Machine(Events):
                         break
                     components[reader.name()] = type_
             return
-        if of not in SIMPLE and of not in structures:
+        if of not in SIMPLE and of not in structures and of not in self.memory.words:
             reader.at -= 1  # values of elements behind the declaration of an array
             cell = self.cell(reader.place(reader.name()))
             reader.expect("=")
@@ -436,7 +442,18 @@ class Machine(Events):
         return value
 
     def move(self, line: Line, reader: Reader) -> None:
-        self.robot.move(line.number, self.motion(reader))
+        """A motion, with what it states for itself behind WITH."""
+        motion = self.motion(reader)
+        before = []
+        while reader.accept("WITH" if not before else ","):
+            cell = self.cell(reader.place(reader.name()))
+            before.append((cell, copied(cell)))
+            reader.expect("=")
+            assign(cell, self.value(reader.expression()), UNDETERMINED)
+        reader.end()
+        self.robot.move(line.number, motion)
+        for cell, earlier in reversed(before):
+            restore(cell, earlier)
 
     def motion(self, reader: Reader) -> Motion:
         word = reader.take()
@@ -455,7 +472,7 @@ class Machine(Events):
             found = self.value(reader.expression())
             angle = NAN if found is UNDETERMINED else float(found)
         rounds, in_tool = [], False
-        while reader.kind != "end":
+        while reader.kind != "end" and reader.next != "WITH":
             if reader.next in ("#BASE", "#TOOL") and relative:
                 in_tool = reader.take() == "#TOOL"
             elif reader.next in ("C_DIS", "C_VEL", "C_ORI", "C_PTP"):

@@ -417,4 +417,27 @@ MISREADINGS = (
             dat="DEFDAT part\nDECL REAL mr=1\nENDDAT\n",
         ),
     ),
+    Misreading(
+        "a wait behind a call",
+        "A routine is read apart, because what it gets is a frame in force; its last motion is said to be approximated,"
+        " and the caller stops the advance run behind the call.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "between()\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n"
+            "DEF between()\n"
+            "inner($BASE.Z)\n"
+            "WAIT SEC 1\n"
+            "END\n"
+            "DEF inner(w:OUT)\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "$APO.CDIS=49\n"
+            "LIN {X 5,Y 2,Z 3,A 4,B 5,C 6} C_DIS\n"
+            "END\n"
+        ),
+    ),
 )

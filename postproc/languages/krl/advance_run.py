@@ -129,6 +129,7 @@ def stopped_motions(rows: MotionRows, continues: Bools) -> dict[int, float]:
         found |= {
             row: 0.0 if row in only and row == len(rows) - 1 else NAN for row in surely | perhaps if row >= 0
         }
-    # whether the advance run stops before the first motion of another module is not worked out
+    # what runs before the first motion of another module, or after a routine that is read apart, is not worked out
     called = expanded(rows, {source for _, sources in rows.calls for source in sources})
-    return found | {before: NAN for before in called if before >= 0}
+    left = expanded(rows, rows.left_from) - found.keys()
+    return found | {before: NAN for before in called | left if before >= 0}
