@@ -62,7 +62,8 @@ class Motion:
 
 
 def execute(made: Made, folder: Path, numbered: bool = True) -> list[Motion] | None:
-    """The motions of a program, None where rs274 does not accept it; the files of the run go into ``folder``."""
+    """The motions of a program but those beside the contour, None where rs274 does not accept it; the files of the run
+    go into ``folder``."""
     (folder / "made.ngc").write_text(made.numbered if numbered else made.text, encoding="latin-1")
     lengths = (0.5, 1.25, 2.0, 3.5)
     (folder / "tool.tbl").write_text(
@@ -87,7 +88,14 @@ def execute(made: Made, folder: Path, numbered: bool = True) -> list[Motion] | N
         return None
     if done.returncode or done.stderr.decode("latin-1").strip() != "executing":
         return None
-    return _Account().of(done.stdout.decode("latin-1"))
+    motions = _Account().of(done.stdout.decode("latin-1"))
+    beside = made.beside if numbered else {}
+    last = {motion.line: at for at, motion in enumerate(motions)}
+    return [
+        motion
+        for at, motion in enumerate(motions)
+        if motion.line not in beside or (beside[motion.line] and at == last[motion.line])
+    ]
 
 
 def _memory(seed: int) -> str:

@@ -29,8 +29,8 @@ Every local variable is set before it is read, as far as the flow does not skip 
 from __future__ import annotations
 
 from .data import MODULE_FRAMES, MODULE_INTS, MODULE_REALS
-from .judge import Case
 from .further import Further
+from .judge import Case
 from .operands import INPUTS, Names
 from .spelling import Spelling
 
