@@ -192,7 +192,8 @@ class _Account:
         before, after = (np.arctan2(*(at - centre)[[v, u]]) for at in (self.here, end))
         sense = 1 if rounds > 0 else -1
         angle = (sense * (after - before)) % (2 * np.pi)
-        if np.hypot(*(end - self.here)[[u, v]]) < 2e-4 * self.unit:
+        # the start may be printed in the other unit, with coarser digits
+        if np.hypot(*(end - self.here)[[u, v]]) < 2.0 * max(1e-4 * self.unit, self.step):
             angle = 2 * np.pi
         angle += 2 * np.pi * (abs(rounds) - 1)
         self.add(line, "CIRC", end, centre=centre, turn=float(sense * angle), plane=(u, v, w))
