@@ -128,6 +128,8 @@ class _Account:
                 end = np.array([float(value) for value in arguments.split(",")[:3]]) * self.unit + self.shift
                 kind = "PTP" if name == "STRAIGHT_TRAVERSE" else "LIN"
                 self.add(number, kind, end)
+            elif name == "NURBS_FEED":
+                self.here = np.array([np.nan, np.nan, self.here[2]])  # its end is not printed
             elif name == "ARC_FEED":
                 self.arc(number, [float(value) for value in arguments.split(",")[:6]])
             else:

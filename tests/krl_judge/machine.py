@@ -8,7 +8,7 @@ What a TRIGGER or an INTERRUPT does comes at a time of its own: see ``events``.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from .evaluate import evaluate
 from .events import Events, Resumed
@@ -96,7 +96,12 @@ def run(code: list[Routine], memory: Memory, inputs: Inputs) -> Run:
         stopped = str(stop)
     except Resumed:
         stopped = "RESUME after the end of the routine that declares the interrupt"
-    return Run(tuple(machine.robot.executed), stopped, bool(machine.reads))
+    motions = machine.robot.executed
+    if (
+        stopped and motions and motions[-1].approximation
+    ):  # whether the next statement would have let it round is open
+        motions[-1] = replace(motions[-1], approximation=None)
+    return Run(tuple(motions), stopped, bool(machine.reads))
 
 
 class Machine(Events):
@@ -302,10 +307,11 @@ class Machine(Events):
         if word == ";label":
             return at + 1
         if following in ("=", ".", "[") and word not in ("DECL",):
-            cell = self.assigned(reader.place(reader.name()))
+            place = reader.place(reader.name())
             reader.expect("=")
             value = self.value(reader.expression())
             reader.end()
+            cell = self.assigned(place)
             if cell is not None:
                 # what becomes of the components that an aggregate leaves out is not documented
                 assign(cell, value, UNDETERMINED)

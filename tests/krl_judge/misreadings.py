@@ -440,4 +440,20 @@ MISREADINGS = (
             "END\n"
         ),
     ),
+    Misreading(
+        "a structure in a list",
+        "A structure gets a new value as a whole, behind one of its parts: the old part is still said to hold.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "jobs[2].P={X 7,Y 7,Z 7,A 0,B 0,C 0}\n"
+            "jobs[2]=job\n"
+            "LIN jobs[2].P\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n",
+            dat="DEFDAT part\nSTRUC jobtype FRAME P,INT count\n"
+            "DECL jobtype job={P {X 1,Y 2,Z 3,A 4,B 5,C 6},count 3}\nDECL jobtype jobs[2]\nENDDAT\n",
+        ),
+    ),
 )

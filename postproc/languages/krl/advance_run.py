@@ -12,7 +12,7 @@ from collections.abc import Callable
 from postproc.base.arrays import Bools
 from postproc.languages.core.waits import Waits
 from postproc.languages.krl.lexing import Assignment, Call, Statement, identifiers, kept
-from postproc.languages.krl.modal_state import NAN
+from postproc.languages.krl.modal_state import NAN, Source
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.predecessors import expanded
 from postproc.languages.krl.statement_effects import READS_POSITION, SYSTEM, bas
@@ -111,14 +111,13 @@ def stopped_motions(rows: MotionRows, continues: Bools) -> dict[int, float]:
     continues (N,): rows that surely start where the row before ends, at which no other motion starts.
     """
     found: dict[int, float] = {}
+    perhaps_before: set[Source] = set()
     for row, stop in rows.stopped.items():
         if row and continues[row]:
             found[row - 1] = 0.0 if stop == Waits.YES else NAN
-            continue
-        sources = rows.sources_of.get(row)
-        for before in {row - 1} if sources is None else expanded(rows, sources):
-            if before >= 0:
-                found[before] = NAN
+        else:
+            perhaps_before.update(rows.sources_of.get(row, {row - 1}))
+    found |= {before: NAN for before in expanded(rows, perhaps_before) if before >= 0}
     if rows.stopped_at_end:
         surely, perhaps = (
             expanded(rows, {source for _, of, stop in rows.stopped_at_end if stop == wanted for source in of})
