@@ -77,6 +77,8 @@ def run(name: str, text: str, **settings: object) -> list[str]:
         # subprograms
         ("linuxcnc", "O1 SUB\nG1 X#1 Y#2\nO1 ENDSUB\nO1 CALL [1]\nO1 CALL [2] [3]\n", ["1 0 0*", "2 3 0*"]),
         ("linuxcnc", "O1 SUB\nG1 X#1\nO1 ENDSUB\n#1=9\nO1 CALL [1]\nG1 Y#1\n", ["1 0 0", "1 9 0"]),
+        ("linuxcnc", "O7 SUB\nG1 X#1\nO7 ENDSUB\n#5=7\nO#5 CALL [1]\nO[#5*2] CALL\nG1 Y3\n", ["1 0 0", "?*"]),
+        ("linuxcnc", "O7 SUB\nG92 X5\nO7 ENDSUB\nO[6+1] CALL\nG1 X6\n", ["1 0 0"]),
         ("fanuc", "M98 P2 L2\nM30\nO2\nG91 G1 X1.\nM99\n", ["1 0 0*", "2 0 0*"]),
         ("fanuc", "M98 P2\nG1 Y1.\nM30\nO2\nG1 X1.\nM99\n", ["1 0 0", "1 1 0"]),
         ("fanuc", "M98 P3\nG1 Y1.\nM30\nO2\nG1 X1.\nM99\n", ["?*", "?*"]),
