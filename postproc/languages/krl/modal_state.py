@@ -220,10 +220,6 @@ def _same(one: object, other: object) -> bool:
     return one is other or one == other or (one != one and other != other)
 
 
-def _joined_numbers(one: float, other: float) -> float:
-    return one if one == other else NAN
-
-
 def _joined_frames(
     one: FrameIndex | UnknownValue, other: FrameIndex | UnknownValue, name: str
 ) -> FrameIndex | UnknownValue:
