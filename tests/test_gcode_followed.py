@@ -77,12 +77,18 @@ def run(name: str, text: str, **settings: object) -> list[str]:
         # subprograms
         ("linuxcnc", "O1 SUB\nG1 X#1 Y#2\nO1 ENDSUB\nO1 CALL [1]\nO1 CALL [2] [3]\n", ["1 0 0*", "2 3 0*"]),
         ("linuxcnc", "O1 SUB\nG1 X#1\nO1 ENDSUB\n#1=9\nO1 CALL [1]\nG1 Y#1\n", ["1 0 0", "1 9 0"]),
+        ("linuxcnc", "O7 SUB\nG1 X#1\nO7 ENDSUB\n#5=7\nO#5 CALL [1]\nO[#5*2] CALL\nG1 Y3\n", ["1 0 0", "?*"]),
+        ("linuxcnc", "O7 SUB\nG92 X5\nO7 ENDSUB\nO[6+1] CALL\nG1 X6\n", ["1 0 0"]),
         ("fanuc", "M98 P2 L2\nM30\nO2\nG91 G1 X1.\nM99\n", ["1 0 0*", "2 0 0*"]),
         ("fanuc", "M98 P2\nG1 Y1.\nM30\nO2\nG1 X1.\nM99\n", ["1 0 0", "1 1 0"]),
         ("fanuc", "M98 P3\nG1 Y1.\nM30\nO2\nG1 X1.\nM99\n", ["?*", "?*"]),
         ("fanuc", "/M98 P2\nM30\nO2\nG1 X1.\nM99\n", ["?*"]),
         ("sinumerik", "L5 P2\nM30\n%_N_L5_SPF\nG91 G1 X1\nM17\n", ["1 0 0*", "2 0 0*"]),
-        # cycles and offsets
+        # cycles, offsets, the tool's radius
+        ("linuxcnc", "G41 D1 G1 X5 Y1\nX7\nG40 X9\nY2\n", ["?*", "?*", "9 1 0", "9 2 0"]),
+        ("sinumerik", "G42 G1 X5 Y1\nX7\nG40\nY2\n", ["?*", "?*", "7 2 0"]),
+        ("fanuc", "G55 G0 X1. Y1. Z1.\n/G56\n/G57\nG1 X2.\n", ["1 1 1", "?*"]),
+        ("fanuc", "/G55\nG0 X1. Y1. Z1.\n/G56\nG1 X2.\n", ["1 1 1*", "?*"]),
         ("sinumerik", "CYCLE82(30,0,2,-5)\nG1 X1\n", ["1 0 30"]),
         ("sinumerik", "MCALL CYCLE81(R1,0,2,-5)\nX1\nMCALL\nG1 X2 Y2\n", ["?*", "?*"]),
         ("sinumerik", "R1=30\nMCALL CYCLE81(R1,0,2,-5)\nX1\nMCALL\nG1 X2\n", ["1 0 30*", "2 0 30"]),

@@ -1,6 +1,6 @@
 """A word that is put into a block changes the reading or gives a finding: none is ever dropped.
 
-Every word of a list at both ends of every block of programs with one block of each kind; where it makes no
+Every word of a list between any two words of every block of programs with one block of each kind; where it makes no
 difference it says what is in force anyway, and stands in a list of these."""
 
 from __future__ import annotations
@@ -87,13 +87,22 @@ GROUPS = (
     ("sinumerik", SINUMERIK_MOTIONS, SINUMERIK_WORDS),
     ("sinumerik", SINUMERIK_OTHERS, SINUMERIK_STATES),
 )
+
+
+def inserted(block: str, word: str) -> list[str]:
+    """The block with the word at its end, at its start and between its words."""
+    parts = block.split(" ")
+    places = (len(parts), 0, *range(1, len(parts)))
+    return [" ".join([*parts[:at], word, *parts[at:]]) for at in places]
+
+
 CASES = [
     (name, block, text)
     for name, blocks, words in GROUPS
     for block in blocks
     for word in words
     if word != block
-    for text in (f"{block} {word}", f"{word} {block}")
+    for text in inserted(block, word)
 ]
 
 
@@ -117,6 +126,12 @@ def test_no_word_is_dropped() -> None:
 @pytest.mark.slow
 def test_no_word_is_dropped_anywhere() -> None:
     assert dropped(CASES) == []
+
+
+def test_a_word_between_mcall_and_its_cycle_is_not_dropped() -> None:
+    cycle = "MCALL CYCLE81(50,0,2,-5)"
+    texts = [f"MCALL {word} CYCLE81(50,0,2,-5)" for word in ("G70", "G55", "X8.25")]
+    assert dropped([("sinumerik", cycle, text) for text in texts]) == []
 
 
 def test_a_word_that_is_dropped_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -381,7 +381,7 @@ def test_a_defect_of_the_caller_is_told_by_its_row(rows: int, monkeypatch: pytes
             dialect.edit_targets(program, change(program), WRITING)
         return str(caught.value)
 
-    lost = "G1 X1 F60\nG41 D1 G1 X2 Y1 Z5\nG40 G1 X3\n"
+    lost = "G1 X1 F60\n#1=2 G1 X2 Y1 Z5\nM8 G1 X3\n"
     assert (
         told(lost, lambda program: plan_of(program, "-2 X1"))
         == "motions that cannot be corrected are moved: rows [2]"
@@ -405,7 +405,7 @@ def test_a_defect_of_the_caller_is_told_by_its_row(rows: int, monkeypatch: pytes
 
     unknown = "G1 X1 F60 Y0 Z0\nG1 X#1 Y0 Z0\nX1 Y0 Z0\n"
     assert told(unknown, found) == "motions that cannot be corrected are moved: rows [2]"
-    pinned = "G1 X1 F60\nX2\nG41 D1 X3\n"
+    pinned = "G1 X1 F60\nX2\n#1=2 X3\n"
     assert (
         told(pinned, lambda program: plan_of(program, "-2 X1"))
         == "motions that cannot be corrected are moved: rows [2]"

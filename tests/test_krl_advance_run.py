@@ -152,7 +152,16 @@ def test_a_routine_of_which_nobody_knows_who_calls_it():
         + LINE.format(7)
         + "END\n"
     )
-    assert blends("", after)[:2] == [2, 0]
+    *inner, last = blends("", after)
+    assert inner == [2, 0]
+    assert np.isnan(last)
+
+
+def test_a_routine_that_is_called_where_calls_are_not_followed():
+    """What it gets is a component of a frame in force; the caller waits behind it."""
+    routines = f"DEF BETWEEN()\nINNER($BASE.Z)\nWAIT SEC 1\nEND\nDEF INNER(W:OUT)\n$APO.CDIS=2\n{LINE.format(5)}END\n"
+    _, at_last = blends(f"{LINE.format(0)}BETWEEN()\n", routines)
+    assert np.isnan(at_last) or at_last == 0
 
 
 @pytest.mark.slow

@@ -101,6 +101,14 @@ def test_no_word_is_dropped_anywhere() -> None:
     assert dropped(cases) == []
 
 
+def test_a_with_that_sets_nothing_is_not_dropped() -> None:
+    cases = [
+        (f"LIN {FULL} C_DIS", f"LIN {FULL} WITH C_DIS"),
+        (f"SLIN {FULL} C_SPL", f"SLIN {FULL}  WITH  C_SPL"),
+    ]
+    assert dropped(cases) == []
+
+
 def test_a_word_that_is_dropped_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """The comparison itself: a reader that overlooks words is found."""
     plain = interpreter.read

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 _NUMBER = re.compile(r"[ \t]*[nN][ \t]*[\d ]+")
 _FLOW = re.compile(r"[ \t]*[oO]")
+_SIDE = re.compile(r"G4[12]\.1(?!\d)", re.I)
+_CENTRE = re.compile(r"G(?:40(?![\d.])|40\.|\[39\+1\])", re.I)
 
 
 @dataclass(frozen=True)
@@ -46,3 +48,19 @@ class Made:
     def numbered(self) -> str:
         """The same program with its line numbers as N words, which rs274 prints beside each motion."""
         return "".join(block.numbered(line) + "\n" for line, block in enumerate(self.blocks, 1))
+
+    @property
+    def beside(self) -> dict[int, bool]:
+        """Lines in which the tool runs beside the contour by its radius, and the one with G40 -> whether that states
+        a motion.  rs274 prints each such motion when it reads a later block, beside the line of that."""
+        found: dict[int, bool] = {}
+        active = False
+        for line, block in enumerate(self.blocks, 1):
+            text = re.sub(r"\([^)]*\)|;.*|[ \t]", "", block.text)
+            if active and _CENTRE.search(text):
+                active, found[line] = False, bool(re.search(r"[XYZ]", text, re.I))
+                continue
+            active = active or bool(_SIDE.search(text))
+            if active:
+                found[line] = False
+        return found

@@ -178,6 +178,9 @@ class Flow(Settings):
             f"[{self.reals.real(self.chance.uniform(-20, 20), self.scope).text}]" for _ in range(count)
         ]
         blank = self.chance.choice((" ", "  ", ""))
+        number = label.lstrip("oO ")
+        if self.has("computed calls") and number.isdigit():
+            label = f"o[{int(number) - 1}+1]"
         self.flow_line(f"{label} {self.key('call')} {blank.join(arguments)}".rstrip())
         before = self.modes.copy()
         if self.maybe(0.7):
@@ -202,6 +205,20 @@ class Flow(Settings):
         options = ["F200.5", "S900", "M8", "M9", "G4 P0.1", "M3 S1000", "M1", "M48", "", "G40"]
         if self.has("comments"):
             options += ["(X5)", "; G91", "(MSG, G1 X5)", "(DEBUG, #1)", "(PRINT, x)", "  (a) (b)"]
+        if self.has("signals"):
+            options += [
+                "M62 P1",
+                "M63 P1",
+                "M64 P0",
+                "M65 P0",
+                "M66 P0 L0",
+                "M66 E0 L0",
+                "M67 E0 Q1.5",
+                "M68 E0 Q2",
+            ]
+            options += ["M7", "M49", "M50 P1", "M51", "M52 P1", "M53 P1", "M19 R90"]
+        if self.has("surface"):
+            options += ["G96 D2500 S300", "G97 S900"]
         choice = self.chance.choice(options)
         if choice == "M3 S1000":
             self.modes.spindle = True
@@ -229,6 +246,9 @@ class Flow(Settings):
             (self.cycles, 3 * self.has("cycles")),
             (self.thread, 1.5 * self.has("threads")),
             (self.polar, 1.5 * self.has("polar")),
+            (self.spline, 1.5 * self.has("splines")),
+            (self.lathe, 1.5 * self.has("diameters")),
+            (self.beside, 2 * self.has("compensated")),
             (self.assign, 3 * self.has("parameters")),
             (self.flow, 2 * self.has("flow")),
             (self.call, 3 * bool(self.subs and self.depth < 2)),

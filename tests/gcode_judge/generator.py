@@ -2,13 +2,15 @@
 
     program    = ["%"] {sub} preamble {step} [end {step}] ["M2" | "M30"] {sub} ["%"]
     step       = motion | arc | mode | unit | offset | setting | shift | machine | home | length | tool | cycles
-               | thread | polar | spindle | assignment | flow | call | saved modes | noise
+               | thread | polar | spline | lathe | beside | spindle | assignment | flow | call | saved modes | noise
     block      = ["/"] ["N" number] {word | assignment | comment}; assignments and modes stand alone or join a motion
     word       = letter real, blanks and case free, "G 1", "g01", "G[0+1]", "G1.", also within numbers
     motion     = [G0 | G1] {X Y Z A B C} [G4 P], modal or stated, absolute or incremental (G90, G91)
     arc        = (G2 | G3) ends (centre by I J K of the plane, one that is 0 maybe without its word | R, also negative)
                  [third axis] [P turns], centres from the start or absolute (G91.1, G90.1), full circles without ends
     thread     = (G33 {X Y} | G33.1) Z K;  polar = G1 [@] [^]
+    spline     = G5 (I J) P Q X Y, after one of its kind without I and J;  lathe = G7 {motion} G8
+    beside     = (G41.1 | G42.1) D motion {motion} [G40] motion: beside the contour by the radius
     mode       = G17 | G18 | G19 | G90 | G91 | G90.1 | G91.1 | G61 | G61.1 | G64 [P [Q]] | G93 | G94 | G95 | G40 | G80
     unit       = G20 | G21
     offset     = G54 ... G59.3
@@ -23,8 +25,9 @@
     flow       = o if/elseif/else/endif | o while/endwhile | o do/while | o repeat/endrepeat; break and continue in
                  them, and of the loop around a repeat in it
     sub        = o sub ... [o return [real]] o endsub [real] | O number ... M99
-    call       = o call {[real]} | M98 P [L]
-    saved      = M70 | M72 | M73 | M71;  noise = F | S | M codes | comments of both kinds | G4
+    call       = o call {[real]} | o[real] call | M98 P [L]
+    saved      = M70 | M72 | M73 | M71;  noise = F | S | M codes | comments of both kinds | G4 | G96 D S | G97
+               | M62 ... M68 with their words
 
 Each program has some of the features only, so that one reading that is wrong does not hide all others.
 """

@@ -34,6 +34,8 @@ MISREADINGS = {
     "#7=[#7+1]\nG0 X#7\no1 continue\no2 endrepeat\no1 endwhile\nM2",
     "a BREAK of a WHILE behind a CONTINUE of a DO": START + "#20=0\n#7=0\no1 do\n#20=[#20+1]\no1 continue\n"
     "o1 while [#20 lt 2]\n#21=0\no2 while [#21 lt 3]\n#21=[#21+1]\n#7=[#7+1]\nG0 X#7\no2 break\no2 endwhile\nM2",
+    "an offset in a deleted block after another one": START
+    + "G1 Y8\n/G58\nG1 X9 Y2 Z2\n/G57\nX2\nG54\nX3 Y3 Z3\nM2",
     "the centre of an arc in a mode that is not known": START + "/G90.1\nG1 X10 Y10\nG3 I-10 J-10\nM2",
 }
 

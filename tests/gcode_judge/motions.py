@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from .blocks import Block
 from .expressions import Real
 from .spelling import PLANES, Spelling
 
@@ -130,6 +131,59 @@ class Motions(Spelling):
             words.append(word)
             modes.here[axis] = None if value is None or (modes.incremental and here is None) else base + value
         return words
+
+    def spline(self) -> None:
+        """Cubic ones that follow each other; in the plane XY."""
+        self.flush()
+        if self.modes.plane != 17 or self.modes.timed:
+            return self.line()
+        for number in range(self.chance.randint(1, 3)):
+            ways = [self.word(letter, self.reals.number(self.chance.uniform(-9, 9), 2)) for letter in "IJPQ"]
+            words = ways if number == 0 or self.maybe(0.5) else ways[2:]
+            self.put(self.code("5"), *self.feed(), *words, *self.targets(self.place(), [0, 1]), plain=True)
+        self.modes.motion = ""
+
+    def lathe(self) -> None:
+        """X as a diameter."""
+        self.flush()
+        self.put(self.code("7"))
+        self.modes.lost()
+        for _ in range(self.chance.randint(0, 2)):
+            self.line()
+        self.flush()
+        self.put(self.code("8"))
+        self.modes.lost()
+
+    def beside(self) -> None:
+        """Beside the contour by the tool's radius; corners that turn away, so that rs274 accepts most of them."""
+        modes, chance = self.modes, self.chance
+        self.flush()
+        if modes.plane != 17 or modes.timed or modes.incremental or self.depth:
+            return self.line()
+        features, self.features = self.features, self.features - {"slash"}
+        self.anchor()
+        modes.motion = "1"
+        side = chance.choice(("41.1", "42.1"))
+        radius = self.reals.number(0.04 * self.size, 2)
+        at, sense = [0.3 * self.size, 0.0], 1.0 if side == "42.1" else -1.0
+        self.put(self.code(side), self.word("D", radius), plain=True)
+        for number in range(chance.randint(2, 5)):
+            words = [self.code("1"), *self.feed()] if number == 0 or self.maybe(0.5) else []
+            self.put(*words, *self.targets([*at, 0.0], [0, 1]), plain=True)
+            turn = math.radians(sense * (40.0 + 60.0 * number))
+            at = [at[0] + 0.4 * self.size * math.cos(turn), at[1] + 0.4 * self.size * math.sin(turn)]
+        if self.maybe(0.5):
+            self.blocks.append(Block(("G40",)))
+            self.features = features
+            self.line()
+        else:
+            self.put(
+                self.code("40"),
+                self.code("1"),
+                *self.targets(self.place(), chance.sample([0, 1], 1)),
+                plain=True,
+            )
+            self.features = features
 
     def polar(self) -> None:
         """A straight motion to polar coordinates."""

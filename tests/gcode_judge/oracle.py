@@ -62,7 +62,8 @@ class Motion:
 
 
 def execute(made: Made, folder: Path, numbered: bool = True) -> list[Motion] | None:
-    """The motions of a program, None where rs274 does not accept it; the files of the run go into ``folder``."""
+    """The motions of a program but those beside the contour, None where rs274 does not accept it; the files of the run
+    go into ``folder``."""
     (folder / "made.ngc").write_text(made.numbered if numbered else made.text, encoding="latin-1")
     lengths = (0.5, 1.25, 2.0, 3.5)
     (folder / "tool.tbl").write_text(
@@ -87,7 +88,14 @@ def execute(made: Made, folder: Path, numbered: bool = True) -> list[Motion] | N
         return None
     if done.returncode or done.stderr.decode("latin-1").strip() != "executing":
         return None
-    return _Account().of(done.stdout.decode("latin-1"))
+    motions = _Account().of(done.stdout.decode("latin-1"))
+    beside = made.beside if numbered else {}
+    last = {motion.line: at for at, motion in enumerate(motions)}
+    return [
+        motion
+        for at, motion in enumerate(motions)
+        if motion.line not in beside or (beside[motion.line] and at == last[motion.line])
+    ]
 
 
 def _memory(seed: int) -> str:
@@ -120,6 +128,8 @@ class _Account:
                 end = np.array([float(value) for value in arguments.split(",")[:3]]) * self.unit + self.shift
                 kind = "PTP" if name == "STRAIGHT_TRAVERSE" else "LIN"
                 self.add(number, kind, end)
+            elif name == "NURBS_FEED":
+                self.here = np.array([np.nan, np.nan, self.here[2]])  # its end is not printed
             elif name == "ARC_FEED":
                 self.arc(number, [float(value) for value in arguments.split(",")[:6]])
             else:
@@ -184,7 +194,8 @@ class _Account:
         before, after = (np.arctan2(*(at - centre)[[v, u]]) for at in (self.here, end))
         sense = 1 if rounds > 0 else -1
         angle = (sense * (after - before)) % (2 * np.pi)
-        if np.hypot(*(end - self.here)[[u, v]]) < 2e-4 * self.unit:
+        # the start may be printed in the other unit, with coarser digits
+        if np.hypot(*(end - self.here)[[u, v]]) < 2.0 * max(1e-4 * self.unit, self.step):
             angle = 2 * np.pi
         angle += 2 * np.pi * (abs(rounds) - 1)
         self.add(line, "CIRC", end, centre=centre, turn=float(sense * angle), plane=(u, v, w))

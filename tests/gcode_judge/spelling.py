@@ -48,6 +48,12 @@ FEATURES = {
     "polar": 0.06,
     "dwells": 0.1,
     "called": 0.5,
+    "compensated": 0.08,
+    "diameters": 0.04,
+    "splines": 0.06,
+    "signals": 0.15,
+    "surface": 0.05,
+    "computed calls": 0.06,
 }
 """Feature -> the share of programs that have it."""
 PLAIN = 0.35

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
+
 from .operands import Operands
 
 MODULE_FRAMES, MODULE_INTS, MODULE_REALS = ("pf", "pg"), ("mi", "mj"), ("mr",)
 
 
 class Data(Operands):
+    has_further = False
+
+    @abstractmethod
+    def further_data(self) -> list[str]: ...
+
     def dat(self) -> list[str]:
         rng = self.rng
         out = [rng.choice(["DEFDAT part", "DEFDAT part PUBLIC"]), "STRUC jobtype FRAME P,INT count"]
@@ -18,6 +25,7 @@ class Data(Operands):
         out += [f"DECL INT {name}={rng.randint(0, 6)}" for name in MODULE_INTS]
         out += [f"DECL REAL {name}={self.number(0, 50)}" for name in MODULE_REALS]
         out.append(f"DECL jobtype job={{P {self.aggregate(plain=True)},count 3}}")
+        out += self.further_data() if self.has_further else []
         out += ["DECL FRAME list[3]", *(f"list[{n}]={self.aggregate(plain=True)}" for n in (1, 2, 3))]
         for n in (1, 2):
             numbers = f"TOOL_NO {rng.randint(1, 3)},BASE_NO {rng.randint(0, 3)}"

@@ -8,7 +8,7 @@ What a TRIGGER or an INTERRUPT does comes at a time of its own: see ``events``.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from .evaluate import evaluate
 from .events import Events, Resumed
@@ -26,6 +26,7 @@ from .values import (
     copied,
     is_set,
     new_cell,
+    restore,
 )
 
 Inputs = Mapping[int, tuple[bool, ...]]
@@ -42,13 +43,15 @@ class _Return(Exception):
 
 @dataclass
 class Memory:
-    """What outlives a run: the variables of the .dat and of $config.dat, BASE_DATA and TOOL_DATA."""
+    """What outlives a run: the variables of the .dat and of $config.dat, BASE_DATA and TOOL_DATA; ``words``: the types
+    that ENUM declares."""
 
     cells: dict[str, Cell]
     structures: dict[str, dict[str, str]]
+    words: set[str] = field(default_factory=set)
 
     def copy(self) -> Memory:
-        return Memory({name: copied(cell) for name, cell in self.cells.items()}, self.structures)
+        return Memory({name: copied(cell) for name, cell in self.cells.items()}, self.structures, self.words)
 
 
 @dataclass
@@ -93,7 +96,12 @@ def run(code: list[Routine], memory: Memory, inputs: Inputs) -> Run:
         stopped = str(stop)
     except Resumed:
         stopped = "RESUME after the end of the routine that declares the interrupt"
-    return Run(tuple(machine.robot.executed), stopped, bool(machine.reads))
+    motions = machine.robot.executed
+    if (
+        stopped and motions and motions[-1].approximation
+    ):  # whether the next statement would have let it round is open
+        motions[-1] = replace(motions[-1], approximation=None)
+    return Run(tuple(motions), stopped, bool(machine.reads))
 
 
 class Machine(Events):
@@ -204,9 +212,9 @@ class Machine(Events):
                 at = self.step(scope, routine.lines[at], at)
         except _Return as back:
             if routine.result:
-                result = Cell(routine.result)
+                result = new_cell(routine.result, self.memory.structures)
                 assign(result, back.value)
-                return result.value
+                return content(result)
             return None
         finally:
             self.scopes.pop()
@@ -220,6 +228,9 @@ class Machine(Events):
             pass
         of = reader.name()
         structures = self.memory.structures
+        if of == "ENUM":
+            self.memory.words.add(reader.name())
+            return
         if of == "STRUC":
             name = reader.name()
             structures[name] = components = {}
@@ -231,7 +242,7 @@ class Machine(Events):
                         break
                     components[reader.name()] = type_
             return
-        if of not in SIMPLE and of not in structures:
+        if of not in SIMPLE and of not in structures and of not in self.memory.words:
             reader.at -= 1  # values of elements behind the declaration of an array
             cell = self.cell(reader.place(reader.name()))
             reader.expect("=")
@@ -296,10 +307,11 @@ class Machine(Events):
         if word == ";label":
             return at + 1
         if following in ("=", ".", "[") and word not in ("DECL",):
-            cell = self.assigned(reader.place(reader.name()))
+            place = reader.place(reader.name())
             reader.expect("=")
             value = self.value(reader.expression())
             reader.end()
+            cell = self.assigned(place)
             if cell is not None:
                 # what becomes of the components that an aggregate leaves out is not documented
                 assign(cell, value, UNDETERMINED)
@@ -436,7 +448,18 @@ class Machine(Events):
         return value
 
     def move(self, line: Line, reader: Reader) -> None:
-        self.robot.move(line.number, self.motion(reader))
+        """A motion, with what it states for itself behind WITH."""
+        motion = self.motion(reader)
+        before = []
+        while reader.accept("WITH" if not before else ","):
+            cell = self.cell(reader.place(reader.name()))
+            before.append((cell, copied(cell)))
+            reader.expect("=")
+            assign(cell, self.value(reader.expression()), UNDETERMINED)
+        reader.end()
+        self.robot.move(line.number, motion)
+        for cell, earlier in reversed(before):
+            restore(cell, earlier)
 
     def motion(self, reader: Reader) -> Motion:
         word = reader.take()
@@ -455,7 +478,7 @@ class Machine(Events):
             found = self.value(reader.expression())
             angle = NAN if found is UNDETERMINED else float(found)
         rounds, in_tool = [], False
-        while reader.kind != "end":
+        while reader.kind != "end" and reader.next != "WITH":
             if reader.next in ("#BASE", "#TOOL") and relative:
                 in_tool = reader.take() == "#TOOL"
             elif reader.next in ("C_DIS", "C_VEL", "C_ORI", "C_PTP"):

@@ -417,4 +417,43 @@ MISREADINGS = (
             dat="DEFDAT part\nDECL REAL mr=1\nENDDAT\n",
         ),
     ),
+    Misreading(
+        "a wait behind a call",
+        "A routine is read apart, because what it gets is a frame in force; its last motion is said to be approximated,"
+        " and the caller stops the advance run behind the call.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "between()\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n"
+            "DEF between()\n"
+            "inner($BASE.Z)\n"
+            "WAIT SEC 1\n"
+            "END\n"
+            "DEF inner(w:OUT)\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "$APO.CDIS=49\n"
+            "LIN {X 5,Y 2,Z 3,A 4,B 5,C 6} C_DIS\n"
+            "END\n"
+        ),
+    ),
+    Misreading(
+        "a structure in a list",
+        "A structure gets a new value as a whole, behind one of its parts: the old part is still said to hold.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "jobs[2].P={X 7,Y 7,Z 7,A 0,B 0,C 0}\n"
+            "jobs[2]=job\n"
+            "LIN jobs[2].P\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n",
+            dat="DEFDAT part\nSTRUC jobtype FRAME P,INT count\n"
+            "DECL jobtype job={P {X 1,Y 2,Z 3,A 4,B 5,C 6},count 3}\nDECL jobtype jobs[2]\nENDDAT\n",
+        ),
+    ),
 )

@@ -3,7 +3,7 @@
     program    = DEF part() declarations settings block END subprogram* event* function?
     block      = statement+
     statement  = motion | frame | assignment | if | switch | for | while | repeat | loop | call | jump | state | form
-               | later | spline | idle
+               | later | further | spline | idle
     motion     = full | partial | named | jump to axes | relative | arc; each with C_DIS, C_VEL or exact
     target     = {X .. C} of numbers, variables, expressions; a point of the .dat or $config.dat; a local frame; an
                  element; a part of a structure; frame : frame
@@ -16,6 +16,7 @@
     call       = subprogram with parameters :IN and :OUT, with and without motions, that set frames or module variables;
                  what comes back is a variable, a component, an element with a computed index, a frame or speed in force
     later      = triggers and interrupts: see ``later``
+    further    = what is rarer, in half of the programs: see ``further``
     spline     = SPLINE, then SPL and SLIN to full and partial points, ENDSPLINE
     jump       = IF .. THEN GOTO over what follows, or back as long as a counter or an input says
     form       = an inline form: FDAT, LDAT or PDAT, BAS(#CP_PARAMS,..), a point of the .dat
@@ -28,13 +29,13 @@ Every local variable is set before it is read, as far as the flow does not skip 
 from __future__ import annotations
 
 from .data import MODULE_FRAMES, MODULE_INTS, MODULE_REALS
+from .further import Further
 from .judge import Case
-from .later import Later
 from .operands import INPUTS, Names
 from .spelling import Spelling
 
 
-class Generator(Later):
+class Generator(Further):
     def __init__(self, seed: int) -> None:
         super().__init__(seed)
         self.lines: list[str] = []
@@ -42,6 +43,7 @@ class Generator(Later):
         self.module = self.rng.random() < 0.5
         self.has_later = self.rng.random() < 0.4
         self.calm = self.has_later and self.rng.random() < 0.6
+        self.has_further = self.rng.random() < 0.5
 
     def case(self) -> Case:
         rng = self.rng
@@ -49,6 +51,7 @@ class Generator(Later):
         self.takes_frame = [rng.choice(["", "", "IN", "OUT"]) for _ in range(self.subprograms)]
         self.event_routines = rng.choice([0, 1, 1, 2]) if self.has_later else 0
         self.has_function = rng.random() < 0.2
+        self.has_frame_function = self.has_further and rng.random() < 0.5
         self.frame_type = "FRAME" if "OUT" in self.takes_frame else rng.choice(["FRAME", "POS", "E6POS"])
         if rng.random() < 0.3:
             self.lines += ["&ACCESS RVP", "&REL 1"]
@@ -62,6 +65,8 @@ class Generator(Later):
                 [[], [], ["mi=mi+1"], ["BAS(#BASE,2)"], ["$TOOL=TOOL_DATA[3]"], ["LIN {Z 5}"], ["mr=v"]]
             )
             self.lines += ["DEFFCT INT twice(v:IN)", "INT v", *does, "RETURN 2*v", "ENDFCT"]
+        if self.has_frame_function:
+            self.lines += self.functions()
         spelling = Spelling(rng)
         src = "".join(spelling.line(line) + "\n" for line in self.lines)
         dat = "".join(spelling.line(line) + "\n" for line in self.dat())
@@ -232,6 +237,9 @@ class Generator(Later):
         out: list[str] = []
         while size > 0:
             size -= 1
+            if self.has_further and self.rng.random() < 0.25:
+                out += self.further(depth)
+                continue
             kind = self.rng.random()
             if kind < 0.3:
                 out += self.motion()
@@ -450,6 +458,9 @@ class Generator(Later):
             names.ints.append("k[1]")
             names.reals.append("s[2]")
         first += hidden
+        if self.has_further:
+            declared, given = self.further_locals()
+            out, first = out + declared, first + given
         rng.shuffle(first)
         return out + first
 

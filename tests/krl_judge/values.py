@@ -74,6 +74,13 @@ def copied(cell: Cell) -> Cell:
     return Cell(cell.type, cell.value, {k: copied(part) for k, part in cell.parts.items()}, cell.is_array)
 
 
+def restore(cell: Cell, earlier: Cell) -> None:
+    """Gives the place, of which others may know, the value of its earlier copy."""
+    cell.value = earlier.value
+    for key, part in cell.parts.items():
+        restore(part, earlier.parts[key])
+
+
 def content(cell: Cell) -> object:
     """The value; of a structure a dict of what is set."""
     if cell.is_array:

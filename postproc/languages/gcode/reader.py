@@ -308,7 +308,9 @@ def _columns(
     """What is kept of the motions of a part."""
     rows, force, stand = moves.block, words.modal.force, moves.tool_orientation
     place = moves.place.copy()
-    place[(words.modal.flow.reason[rows] != 0) | np.isnan(place).any(axis=1)] = np.nan
+    # beside the contour, by the tool's radius: that is also where the motion after G40 starts
+    beside = force[Group.RADIUS][rows] != 0
+    place[(words.modal.flow.reason[rows] != 0) | beside | np.isnan(place).any(axis=1)] = np.nan
     placed = ~np.isnan(place[:, :1])
     feed = feeds.of(rows + words.start, moves.length)
     rotary_from, rotary_to = stand.rotary

@@ -77,12 +77,9 @@ class RunCalls(RunState):
         self, block: int, verb: str, statement: FlowStatement | None
     ) -> tuple[int, int, int, dict[str, float] | None] | None:
         """First block, the one after the last, runs and own variables of what is called; None where it is not here."""
-        if (
-            statement is not None
-            and statement.label.startswith("O")
-            and statement.label in self.shape.subprograms
-        ):
-            around = self.shape.subprograms[statement.label]
+        label = "" if statement is None else self.called_label(statement)
+        if statement is not None and label.startswith("O") and label in self.shape.subprograms:
+            around = self.shape.subprograms[label]
             self.sizes[around.start + 1] = around.stop
             values = [self.value(text, block) for text in _bracketed(statement.text)]
             numbered = {f"#{number}": 0.0 for number in range(1, 31)}
@@ -119,6 +116,14 @@ class RunCalls(RunState):
             given = {f"#{_ARGUMENTS[one]}": value for one, value in words.items() if not math.isnan(value)}
             return (*part, runs, given)
         return (*part, runs, None)
+
+    def called_label(self, statement: FlowStatement) -> str:
+        """What a call names; O#1 and O[#1+1] with the number that they give."""
+        label = statement.label
+        if not label.startswith(("O#", "O[")):
+            return label
+        number = self.value(label[1:], statement.block)
+        return label if math.isnan(number) or number != math.floor(number) else f"O{number:.0f}"
 
     def returned(self, statement: FlowStatement) -> None:
         """The value that a subprogram returns."""

@@ -302,6 +302,8 @@ class _SinumerikLine:
             # With a cycle after it, every block with a position calls that; alone it ends this.
             called = _NAME.search(text, end)
             drilling = called is not None and called[0].upper() in DRILLING
+            if drilling and called is not None and (between := text[end : called.start()].strip()):
+                self.note("unknown", between)
             on = b"MCALL(CYCLE)" if drilling else b"MCALL()" if text[end:].strip() else b"MCALL_OFF"
             self.codes(place, len(text.rstrip()), on)
             if drilling and called is not None:

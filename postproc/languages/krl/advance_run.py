@@ -12,7 +12,7 @@ from collections.abc import Callable
 from postproc.base.arrays import Bools
 from postproc.languages.core.waits import Waits
 from postproc.languages.krl.lexing import Assignment, Call, Statement, cached, identifiers
-from postproc.languages.krl.modal_state import NAN
+from postproc.languages.krl.modal_state import NAN, Source
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.predecessors import expanded
 from postproc.languages.krl.statement_effects import READS_POSITION, SYSTEM, bas
@@ -111,14 +111,13 @@ def stopped_motions(rows: MotionRows, continues: Bools) -> dict[int, float]:
     continues (N,): rows that surely start where the row before ends, at which no other motion starts.
     """
     found: dict[int, float] = {}
+    perhaps_before: set[Source] = set()
     for row, stop in rows.stopped.items():
         if row and continues[row]:
             found[row - 1] = 0.0 if stop == Waits.YES else NAN
-            continue
-        sources = rows.sources_of.get(row)
-        for before in {row - 1} if sources is None else expanded(rows, sources):
-            if before >= 0:
-                found[before] = NAN
+        else:
+            perhaps_before.update(rows.sources_of.get(row, {row - 1}))
+    found |= {before: NAN for before in expanded(rows, perhaps_before) if before >= 0}
     if rows.stopped_at_end:
         surely, perhaps = (
             expanded(rows, {source for _, of, stop in rows.stopped_at_end if stop == wanted for source in of})
@@ -129,6 +128,7 @@ def stopped_motions(rows: MotionRows, continues: Bools) -> dict[int, float]:
         found |= {
             row: 0.0 if row in only and row == len(rows) - 1 else NAN for row in surely | perhaps if row >= 0
         }
-    # whether the advance run stops before the first motion of another module is not worked out
+    # what runs before the first motion of another module, or after a routine that is read apart, is not worked out
     called = expanded(rows, {source for _, sources in rows.calls for source in sources})
-    return found | {before: NAN for before in called if before >= 0}
+    left = expanded(rows, rows.left_from) - found.keys()
+    return found | {before: NAN for before in called | left if before >= 0}

@@ -96,11 +96,11 @@ def take_apart(code: bytes, start: int) -> Parts:
             reference = mark.span()
         elif token.upper() == b"WITH":
             clause = code[at:]
-            odd = odd or (b"" if clause.strip() else token)
             found = _LAST_SLUR.search(clause)
             if found:
                 approximations.append(b"C_" + found[1].upper())
                 clause = clause[: found.start()]
+            odd = odd or (b"" if clause.strip() else token)
             break
         elif token != b",":
             approximations.append(token.upper())

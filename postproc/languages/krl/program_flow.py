@@ -292,6 +292,8 @@ class ProgramFlow(Calls):
             state.no_advance = ahead
         if state.stop is Waits.YES:
             return
+        if state.stop and isinstance(item.strings, Assignment) and b"$" not in item.code:
+            return  # it stops for sure at variables of the system alone
         if not self.stops[pc]:  # it is the same each time: the types of a routine's names do not change
             self.stops[pc] = 1 + stop_of(item, self._is_continued(pc), self.run.type_of)
         state.stop = max(state.stop, _WAITS[self.stops[pc] - 1])

@@ -8,6 +8,8 @@ from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.krl.expressions import Value, component
 from postproc.languages.krl.target import FrameEntry, KrlTarget, UnknownValue, shown
 
+MOST_PARTS = 64
+"""Parts of one element or component that are distinguished where a value of the whole takes their place."""
 Entry = dict[bytes, Value]
 """The values of one name by what follows it: b"" itself, b"[2]", b".F", b"[2].F"."""
 
@@ -43,6 +45,7 @@ class Variables:
         self.mixed: set[bytes] = set()
         self.asked: set[bytes] = set()
         self._paths = KeyNumbers()
+        self._parts: dict[bytes, list[bytes]] = {}
         self._nothing = PersistentMap(self._paths)
         self.facts = VariableFacts(PersistentMap(KeyNumbers()), None)
 
@@ -59,7 +62,23 @@ class Variables:
         entry = self.facts.names.get(name)
         if entry is None:
             entry = self._entry(self.fixed.get(name) or {}, 0)
+        self._note(path)
+        parts = self._parts.get(path, ())
+        if len(parts) > MOST_PARTS:
+            why = UnknownValue("KRL002", f"{shown(name + path)} has more than {MOST_PARTS} parts")
+            entry, parts = self._nothing.set(b"", Fact(why, self.line)), ()
+        for part in parts:
+            entry = entry.set(part, None)
         self._put(name, entry.set(path, Fact(value, self.line)))
+
+    def _note(self, path: bytes) -> None:
+        """Takes up a path as a part of what is before it: [2].P of [2]."""
+        if path in self._paths.numbers:
+            return
+        head, dot, _ = path.rpartition(b".")
+        while dot and head:
+            self._parts.setdefault(head, []).append(path)
+            head, dot, _ = head.rpartition(b".")
 
     def replace(self, name: bytes, entry: Entry) -> None:
         """Gives a name these values instead of all that it had."""
@@ -132,6 +151,7 @@ class Variables:
     def _entry(self, values: Entry, line: int) -> PersistentMap:
         entry = self._nothing
         for path, value in values.items():
+            self._note(path)
             entry = entry.set(path, Fact(value, line))
         return entry
 
