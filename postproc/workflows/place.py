@@ -8,14 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
+from postproc.base.arrays import Floats
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import Inputs, noted
 from postproc.base.paged_memory import large_arrays_in_files
-from postproc.base.units import DEG
+from postproc.base.units import DEG, MM, are_radians
 from postproc.output.atomic_write import write_atomically
 from postproc.placement.collisions import CollisionShapes, colliding_rows
-from postproc.placement.room import FREEDOMS, UNITS
-from postproc.placement.score_places import score_places
+from postproc.placement.margin_words import margin_words, reach_shortfall, reach_words
+from postproc.placement.room import FREEDOMS, TOOL_TURN, TURN, UNITS, X, Y, Z
+from postproc.placement.score_places import joint_margins, score_places
 from postproc.placement.search_places import SearchResult, distinct, search_places
 from postproc.report.placement import PlacedFigures, Placement
 from postproc.report.placement_spin import spin_sentence
@@ -191,15 +193,7 @@ def _no_place(problem: PlaceProblem, result: SearchResult, dropped: list[Finding
     near = result.pool.places[result.pool.order()[:1]]
     whole = score_places(problem.model, problem.motions, room, problem.scoring, near, detailed=True)
     assert whole.lack is not None
-    assert whole.limit is not None
-    assert whole.singular is not None
     at = int(whole.lack[0].argmax())
-    line, limit, singular = (
-        int(problem.motions.line[at]),
-        float(whole.limit[0, at] / DEG),
-        float(whole.singular[0, at] / DEG),
-    )
-    file = str(request.programs[int(problem.motions.program[at])])
     where = ", ".join(
         f"{name} {near[0, i] / UNITS[i]:.1f}" for i, name in enumerate(FREEDOMS) if i in room.free
     )
@@ -209,25 +203,59 @@ def _no_place(problem: PlaceProblem, result: SearchResult, dropped: list[Finding
         else np.array([-1])
     )
     if hits[0] >= 0:
-        line, file = (
-            int(problem.motions.line[hits[0]]),
-            str(request.programs[int(problem.motions.program[hits[0]])]),
-        )
-        what = "collides"
-    elif not np.isfinite(limit):
-        what = "is out of reach"
-    elif limit < request.limit_margin:
-        what = f"is {limit:.1f} deg from the limit of an axis (margin {request.limit_margin:g} deg)"
-    elif singular < request.singularity_margin:
-        what = f"is {singular:.1f} deg from a singularity (margin {request.singularity_margin:g} deg)"
+        at, what = int(hits[0]), "bodies collide"
     else:
-        what = "cannot be followed"
+        what = _lacking(problem, near, at)
+    line, file = int(problem.motions.line[at]), str(request.programs[int(problem.motions.program[at])])
     count = int((whole.lack[0] > 0).sum())
     message = (
-        f"none of {result.looked} places is feasible; at the one nearest to it ({where}) this motion {what}"
-        + (f", and {count - 1} more places of the programs lack too" if count > 1 else "")
+        f"none of {result.looked} places is feasible; at the nearest one ({where}) {what} in this motion"
     )
-    return Finding("PLC002", message, file, line, help=_metres(request.ranges))
+    if count > 1:
+        message += f", and {count - 1} other places of the paths are not feasible either"
+    return Finding("PLC002", message, file, line, help=_metres(request.ranges) or _elsewhere(problem))
+
+
+def _lacking(problem: PlaceProblem, near: Floats, at: int) -> str:
+    """Which limit the motion ``at`` of the search violates most with the part at ``near`` (1, 6)."""
+    request, motions, robot = problem.request, problem.motions, problem.model.robot
+    q, limit, singular = joint_margins(problem.model, motions, near)
+    if not np.isfinite(limit[0, at]):
+        return reach_words(float(reach_shortfall(robot, motions.flanges(near))[at]))
+    margins = (request.limit_margin, request.singularity_margin)
+    return margin_words(robot, q[0, at], float(singular[0, at]), margins) or "the path cannot be followed"
+
+
+def _radians(problem: PlaceProblem) -> list[Finding]:
+    """PLC021 for ranges of turns whose ends are round parts of pi: deg that were written as radians."""
+    found = []
+    for i in (TURN, TOOL_TURN):
+        ends = np.array([problem.room.lower[i], problem.room.upper[i]]) / UNITS[i]
+        if i in problem.room.free and are_radians(ends.tolist()):
+            low, high = ends.tolist()
+            name = FREEDOMS[i].replace("_", "-")
+            message = f"the range of {name}, {low:g} .. {high:g} deg, is round only in radians"
+            help = f"turns are in deg: from radians --{name} {low / DEG:.4g}:{high / DEG:.4g}"
+            found.append(Finding("PLC021", message, str(problem.moved.cell.path), help=help))
+    return found
+
+
+def _elsewhere(problem: PlaceProblem) -> str:
+    """A help where the room does not contain the present place: its ranges may be meant against that; "" otherwise."""
+    room = problem.room
+    away = [i for i in (X, Y, Z) if not room.lower[i] <= room.present[i] <= room.upper[i]]
+    if not away:
+        return ""
+    now = ", ".join(f"{FREEDOMS[i]} {room.present[i] / MM:g}" for i in away)
+    words = f"ranges are places of the base in $WORLD; the present one, {now}, is outside of them"
+    about = [i for i in away if room.lower[i] < 0.0 < room.upper[i]]
+    if about:
+        ends = (
+            (FREEDOMS[i], room.present[i] + room.lower[i], room.present[i] + room.upper[i]) for i in about
+        )
+        meant = " ".join(f"--{name} {low / MM:g}:{high / MM:g}" for name, low, high in ends)
+        words += f"; relative to it, write {meant}"
+    return words
 
 
 def _metres(ranges: Mapping[str, tuple[float, float]]) -> str:
@@ -251,6 +279,7 @@ def _findings(
             f" singularity {present.singular_deg:.1f} deg"
         )
         found.append(Finding("PLC006", message, str(request.programs[0]), present.limit_line))
+    found += _radians(problem)
     edges = problem.room.at_edge(best.place)
     if edges:
         found.append(Finding("PLC007", f"the best place is at the edge of: {', '.join(edges)}", cell))
