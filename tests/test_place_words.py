@@ -65,6 +65,7 @@ def test_the_shortfall_is_how_far_the_target_has_to_come(arm):
 
 def test_what_is_not_known_is_not_stated():
     assert reach_words(0.6064) == "the target is out of reach by 606 mm"
+    assert reach_words(0.0) == "the target is out of reach in this configuration"
     assert reach_words(float("nan")) == "the target is out of reach"
 
 

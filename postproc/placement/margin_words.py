@@ -37,7 +37,10 @@ def margin_words(robot: Robot, q: Floats, singular: float, margins: tuple[float,
 
 
 def reach_words(shortfall: float) -> str:
-    """Of a target that the arm is too short or too long for, by ``shortfall`` [m], NaN where that is not known."""
+    """Of a target that the arm is too short or too long for, by ``shortfall`` [m], NaN where that is not known; 0 where
+    it is within reach in another configuration."""
+    if shortfall == 0:
+        return "the target is out of reach in this configuration"
     return "the target is out of reach" + (f" by {shortfall / MM:.0f} mm" if shortfall > 0 else "")
 
 

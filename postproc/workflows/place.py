@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,11 +11,10 @@ from postproc.base.arrays import Floats
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import Inputs, noted
 from postproc.base.paged_memory import large_arrays_in_files
-from postproc.base.units import DEG, MM, are_radians
 from postproc.output.atomic_write import write_atomically
 from postproc.placement.collisions import CollisionShapes, colliding_rows
 from postproc.placement.margin_words import margin_words, reach_shortfall, reach_words
-from postproc.placement.room import FREEDOMS, TOOL_TURN, TURN, UNITS, X, Y, Z
+from postproc.placement.room import FREEDOMS, UNITS
 from postproc.placement.score_places import joint_margins, score_places
 from postproc.placement.search_places import SearchResult, distinct, search_places
 from postproc.report.placement import PlacedFigures, Placement
@@ -29,13 +27,11 @@ from postproc.workflows.place_exact import exact_figures
 from postproc.workflows.place_feed import feed_turns
 from postproc.workflows.place_problem import PlaceProblem, PlaceRequest, place_problem, stated_direction
 from postproc.workflows.place_spin import SpunPrograms, spin_programs
+from postproc.workflows.place_units import metres_help, radian_ranges, room_elsewhere
 from postproc.workflows.preparation import Stage, silent
 
 POOL = 1500
 """Places that the regret is taken against."""
-
-METRES = 10.0
-"""[mm] All ranges that lie within so little are taken for metres."""
 
 EXACT = 20_000
 """Places on paths up to which every listed place is predicted as the main job does; of more, the best one and the
@@ -213,7 +209,7 @@ def _no_place(problem: PlaceProblem, result: SearchResult, dropped: list[Finding
     )
     if count > 1:
         message += f", and {count - 1} other places of the paths are not feasible either"
-    return Finding("PLC002", message, file, line, help=_metres(request.ranges) or _elsewhere(problem))
+    return Finding("PLC002", message, file, line, help=metres_help(request.ranges) or room_elsewhere(room))
 
 
 def _lacking(problem: PlaceProblem, near: Floats, at: int) -> str:
@@ -224,47 +220,6 @@ def _lacking(problem: PlaceProblem, near: Floats, at: int) -> str:
         return reach_words(float(reach_shortfall(robot, motions.flanges(near))[at]))
     margins = (request.limit_margin, request.singularity_margin)
     return margin_words(robot, q[0, at], float(singular[0, at]), margins) or "the path cannot be followed"
-
-
-def _radians(problem: PlaceProblem) -> list[Finding]:
-    """PLC021 for ranges of turns whose ends are round parts of pi: deg that were written as radians."""
-    found = []
-    for i in (TURN, TOOL_TURN):
-        ends = np.array([problem.room.lower[i], problem.room.upper[i]]) / UNITS[i]
-        if i in problem.room.free and are_radians(ends.tolist()):
-            low, high = ends.tolist()
-            name = FREEDOMS[i].replace("_", "-")
-            message = f"the range of {name}, {low:g} .. {high:g} deg, is round only in radians"
-            help = f"turns are in deg: from radians --{name} {low / DEG:.4g}:{high / DEG:.4g}"
-            found.append(Finding("PLC021", message, str(problem.moved.cell.path), help=help))
-    return found
-
-
-def _elsewhere(problem: PlaceProblem) -> str:
-    """A help where the room does not contain the present place: its ranges may be meant against that; "" otherwise."""
-    room = problem.room
-    away = [i for i in (X, Y, Z) if not room.lower[i] <= room.present[i] <= room.upper[i]]
-    if not away:
-        return ""
-    now = ", ".join(f"{FREEDOMS[i]} {room.present[i] / MM:g}" for i in away)
-    words = f"ranges are places of the base in $WORLD; the present one, {now}, is outside of them"
-    about = [i for i in away if room.lower[i] < 0.0 < room.upper[i]]
-    if about:
-        ends = (
-            (FREEDOMS[i], room.present[i] + room.lower[i], room.present[i] + room.upper[i]) for i in about
-        )
-        meant = " ".join(f"--{name} {low / MM:g}:{high / MM:g}" for name, low, high in ends)
-        words += f"; relative to it, write {meant}"
-    return words
-
-
-def _metres(ranges: Mapping[str, tuple[float, float]]) -> str:
-    """A help where all lengths of ``ranges`` [mm] are those of metres; "" otherwise."""
-    lengths = {name: ranges[name] for name in ("x", "y", "z") if name in ranges}
-    if not lengths or any(max(-low, high) >= METRES for low, high in lengths.values()):
-        return ""
-    name, (low, high) = next(iter(lengths.items()))
-    return f"ranges are in mm: for metres write --{name} {1000 * low:g}:{1000 * high:g}"
 
 
 def _findings(
@@ -279,7 +234,7 @@ def _findings(
             f" singularity {present.singular_deg:.1f} deg"
         )
         found.append(Finding("PLC006", message, str(request.programs[0]), present.limit_line))
-    found += _radians(problem)
+    found += radian_ranges(problem.room, cell)
     edges = problem.room.at_edge(best.place)
     if edges:
         found.append(Finding("PLC007", f"the best place is at the edge of: {', '.join(edges)}", cell))
