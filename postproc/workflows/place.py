@@ -12,7 +12,7 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import Inputs, noted
 from postproc.base.paged_memory import large_arrays_in_files
 from postproc.output.atomic_write import write_atomically
-from postproc.placement.collisions import CollisionShapes, colliding_rows
+from postproc.placement.collisions import CollisionShapes, first_collision
 from postproc.placement.margin_words import margin_words, reach_shortfall, reach_words
 from postproc.placement.room import FREEDOMS, UNITS
 from postproc.placement.score_places import joint_margins, score_places
@@ -193,13 +193,13 @@ def _no_place(problem: PlaceProblem, result: SearchResult, dropped: list[Finding
     where = ", ".join(
         f"{name} {near[0, i] / UNITS[i]:.1f}" for i, name in enumerate(FREEDOMS) if i in room.free
     )
-    hits = (
-        colliding_rows(problem.shapes, problem.model, problem.motions, near)
-        if isinstance(problem.shapes, CollisionShapes) and not whole.lack[0].any()
-        else np.array([-1])
-    )
-    if hits[0] >= 0:
-        at, what = int(hits[0]), "bodies collide"
+    hit = None
+    if isinstance(problem.shapes, CollisionShapes) and not whole.lack[0].any():
+        q, _, _ = joint_margins(problem.model, problem.motions, near)
+        hit = first_collision(problem.shapes, q[0])
+    if hit is not None:
+        at, (one, other) = hit
+        what = f"{one} collides with {other}"
     else:
         what = _lacking(problem, near, at)
     line, file = int(problem.motions.line[at]), str(request.programs[int(problem.motions.program[at])])
