@@ -113,6 +113,10 @@ class Dialect(Protocol):
     def letters(self) -> bytes:
         """Capital letters of the words that its edits may take out of the line of a motion, or put in."""
 
+    @property
+    def suffixes(self) -> tuple[str, ...]:
+        """The endings, in small letters, of files that a controller loads as a program; none where it takes any."""
+
     def claims(self, path: Path, raw: bytes) -> bool:
         """Whether a file of this name and content is of this dialect."""
 

@@ -35,6 +35,7 @@ class KrlDialect:
     name = "krl"
     family = "KRL"
     letters = b"ABCDEFGHIJKLMNOPQRSTUVWXYZ"  # points have names
+    suffixes: tuple[str, ...] = (".src", ".sub")
 
     def claims(self, path: Path, raw: bytes) -> bool:
         return path.suffix.lower() == ".src" or _CLAIM.search(raw) is not None
