@@ -662,7 +662,7 @@ def test_the_first_source_that_exists_is_taken(tmp_path):
 
 def test_force_off_alone_is_an_annotation():
     result = run(path_of(HORIZONTAL, notes=[(0, "FORCE OFF", 1)]), "", cell_of(force="1,2,3"))
-    assert (result.source, result.any) == ("FORCE comments", False)
+    assert (result.source, result.any) == ("cell: 1,2,3", False)
 
 
 def test_no_force_at_all_shows_all_three_ways():

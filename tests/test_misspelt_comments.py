@@ -76,3 +76,17 @@ def test_a_switch_that_does_not_switch_is_reported(compensate, job, comment):
     done = compensate(job.program, "--force", "--json", "-")
     assert done.code == 3
     assert ("COR011", 2) in [(one["code"], one["line"]) for one in done.json["findings"]]
+
+
+def test_comments_that_only_end_a_force_state_none(compensate, job):
+    """Where FORCE OFF alone is stated, the force of the cell holds for the motions that are not under it."""
+    changed(job, CUT, ";nothing")
+    lines = [line for line in job.program.read_text().splitlines() if line != ";FORCE 0 200 0"]
+    job.write(lines)
+    assert compensate(job.program, "--force", "--dry-run", "--json", "-").json["verdict"] == "not_corrected"
+    with (job.folder / "cell.yaml").open("a") as stream:
+        stream.write("force: 0,360,560\n")
+    done = compensate(job.program, "--force", "--dry-run", "--json", "-")
+    assert done.json["force"]["max_n"] == pytest.approx(665.7, abs=0.1)
+    stated = compensate(job.program, "--force=0,360,560", "--dry-run", "--json", "-")
+    assert 0 < done.json["corrected"] < stated.json["corrected"]
