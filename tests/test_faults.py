@@ -73,7 +73,7 @@ def there_without_results(folder: Path) -> dict[str, bytes]:
 def test_killed_at_random_moments(shop):
     job, folder, _, new, begin, check = shop
     lasts = seconds(lambda: Child([job.program, NEW], job.folder).end())
-    moments = random.Random(1)
+    moments, finished = random.Random(1), 0
     begin()
     for number in range(KILLS):
         if number % 5 == 4:  # what the killed ones left half-written is gone after a run
@@ -85,7 +85,8 @@ def test_killed_at_random_moments(shop):
         time.sleep(moments.uniform(0.0, lasts))
         os.kill(child.pid, signal.SIGKILL)
         child.end()
-        check()
+        finished += check()
+    print(f"{KILLS} kills: {finished} after the files were written, all files whole or absent")
     assert Child([job.program, NEW], job.folder).end() in (0, 3)
     assert there(folder) == new
     assert stray(job.folder) == []

@@ -488,7 +488,7 @@ def test_annotations_are_modal_from_their_row_on():
 
 def test_point_to_point_motions_that_a_comment_gives_a_force_are_told():
     kinds = [Kind.PTP, Kind.LIN, Kind.PTP, Kind.AXIS, Kind.LIN, Kind.PTP, Kind.PTP, Kind.PTP]
-    notes = [(1, "FORCE 1 0 0", 5), (5, "FORCE OFF", 6), (6, "FORCE 0 0 0", 7)]
+    notes = [(1, "FORCE 10 0 0", 5), (5, "FORCE OFF", 6), (6, "FORCE 0 0 0", 7)]
     path = path_of([[0, 0.1 * (-1) ** i, 0] for i in range(8)], kinds, notes=notes)
     (finding,) = run(path, "").findings
     assert (finding.code, finding.line) == ("FRC009", 12)
@@ -525,9 +525,14 @@ def test_all_malformed_annotations_are_told():
     assert [finding.line for finding in refused(path_of(HORIZONTAL, notes=notes), "")] == [7, 9]
 
 
-@pytest.mark.parametrize(
-    "text", ["FORCE sensor zeroed", "FORCED AIR ON", "FORCE: 1 2 3", "FORCEOFF", "FORCE info"]
-)
+@pytest.mark.parametrize("text", ["FORCE: 1 2 3", "FORCEOFF", "FORCE=OFF"])
+def test_what_was_meant_as_a_force_is_refused(text):
+    notes = [(0, "FORCE 1 2 3", 7), (1, text, 8)]
+    (finding,) = refused(path_of(HORIZONTAL, notes=notes), "")
+    assert (finding.code, finding.file, finding.line) == ("FRC002", "part.src", 8)
+
+
+@pytest.mark.parametrize("text", ["FORCE sensor zeroed", "FORCED AIR ON", "FORCE info"])
 def test_comments_that_only_begin_with_force_are_told(text):
     notes = [(0, "FORCE 1 2 3", 7), (1, text, 8), (2, "COMPENSATE OFF", 9)]
     result = run(path_of(HORIZONTAL, notes=notes), "")
@@ -657,7 +662,7 @@ def test_the_first_source_that_exists_is_taken(tmp_path):
 
 def test_force_off_alone_is_an_annotation():
     result = run(path_of(HORIZONTAL, notes=[(0, "FORCE OFF", 1)]), "", cell_of(force="1,2,3"))
-    assert (result.source, result.any) == ("FORCE comments", False)
+    assert (result.source, result.any) == ("cell: 1,2,3", False)
 
 
 def test_no_force_at_all_shows_all_three_ways():

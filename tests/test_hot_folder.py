@@ -105,6 +105,23 @@ def test_a_journal_moves_nothing_outside(hot, tmp_path):
     assert (hot / "cell.yaml").exists()
 
 
+@pytest.mark.parametrize(
+    ("words_", "said"),
+    [
+        (["--force=0,360"], ["FRC002", "2 numbers"]),
+        (["--force", "log.csv"], ["FIL001", "log.csv"]),
+        (["--cell", "cel.yaml"], ["FIL001", "cel.yaml"]),
+        (["--robot", "kuka_kr27"], ["CEL003", "did you mean"]),
+    ],
+    ids=str,
+)
+def test_options_that_no_program_could_use_are_refused_at_once(compensate, hot, words_, said):
+    """Before a program arrives: a watcher that fails each of them is started in the evening, found in the morning."""
+    done = compensate("watch", hot, "--settle", "0", "--once", *words_)
+    assert done.code == 1
+    assert [word for word in said if word not in done.err] == [], done.err
+
+
 @pytest.mark.slow
 def test_killed_at_random_moments_every_program_is_done_once(hot):
     count, kills = 12, int(os.environ.get("POSTPROC_KILLS", "50"))

@@ -381,7 +381,7 @@ def test_nothing_is_read_but_written_where_asked(job, compensate):
     assert "collisions are NOT checked" in shown[0]
 
 
-LIMIT = ["PLC002", "limit of an axis", "margin 80"]
+LIMIT = ["PLC002", "deg from its limit of", "margin 80"]
 SINGULAR = ["PLC002", "singularity", "margin 55"]
 
 
@@ -391,11 +391,18 @@ SINGULAR = ["PLC002", "singularity", "margin 55"]
         ([], 1, ["PLC003", "no freedom has a range", "--x a:b"]),
         (["--x", "1500"], 2, ["no range a:b"]),
         (["--x", "1500:1500"], 2, ["no width"]),
-        (["--turn=30:-30"], 2, ["no width", "not below"]),
+        (["--turn=30:-30"], 2, ["no width", "not below", "write -30:30"]),
+        (["--turn=-400:30"], 2, ["-400 exceeds 360"]),
         (["--x", "a:b"], 2, ["'a' is not a number"]),
+        (["--x", "1400,5:1600,5"], 2, ["'1400,5' has a decimal comma; write 1400.5"]),
         (["--track", "0:100"], 1, ["PLC003", "linear track"]),
         (["--x", "1.2:1.8", "--y", "-0.5:0.5"], 1, ["PLC002", "for metres write --x 1200:1800"]),
-        (["--x", "9000:9500"], 1, ["PLC002", "part.src:", "out of reach"]),
+        (
+            ["--x", "9000:9500"],
+            1,
+            ["PLC002", "part.src:", "out of reach by", "present one, x 1500, is outside"],
+        ),
+        (["--x=-100:100"], 1, ["PLC002", "relative to it, write --x 1400:1600"]),
         pytest.param(["--x", "2200:2300", "--y=900:950"], 1, ["PLC002", "part.src:", "none of"], marks=SLOW),
         pytest.param(
             ["--x", "1400:1600", "--limit-margin", "80"],
@@ -433,6 +440,7 @@ def test_mistakes(job, compensate, monkeypatch, words, code, said):
         ("{polygon: [[0, 0], [900, 900], [900, 0], [0, 900]]}", ["crosses itself"]),
         ("{polygon: [[0, 0], [900, 0]]}", ["2 corners"]),
         ("{w: [1, 2]}", ["YML002", "room.w"]),
+        ("{turn: [-400, 10]}", ["YML004", "room.turn", "whole turn"]),
         ("{}", ["states nothing"]),
     ],
 )

@@ -88,7 +88,7 @@ def test_a_place_that_collides_is_not_listed(job):
     with pytest.raises(Refusal) as refusal:
         place(replace(with_shapes, collisions=everywhere))
     assert refusal.value.findings[0].code == "PLC002"
-    assert "this motion collides" in refusal.value.findings[0].message
+    assert "collides with table in this motion" in refusal.value.findings[0].message
     assert checked.to_dict()["collisions_checked"] is True
 
 

@@ -126,6 +126,15 @@ def test_from_python(parts):
         postproc.assign(programs, {"left": (1500, -200)}, force=True)
 
 
+def test_places_in_other_units_are_reported(job, compensate):
+    done = compensate("assign", job.program, "--force", "--at", "a=1.5,-0.2,0.6")
+    assert done.code == 1
+    assert "for metres write --at a=1500,-200,600" in " ".join(done.err.split())
+    done = compensate("assign", job.program, "--force", "--at", "a=1500,-200,600,0.785", "--json", "-")
+    assert done.code == 3
+    assert "PLC021" in {one["code"] for one in done.json["findings"]}
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

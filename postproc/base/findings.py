@@ -114,6 +114,14 @@ LONGEST_WORD = 100
 """Longer words are not compared: that takes the product of their lengths."""
 
 
+def resembles(word: str, wanted: str) -> bool:
+    """Whether ``word``, in any case, is ``wanted`` or a misspelling of it."""
+    word, wanted = word.upper(), wanted.upper()
+    if abs(len(word) - len(wanted)) > 2:
+        return False
+    return difflib.SequenceMatcher(None, word, wanted).ratio() >= 0.75
+
+
 def nearest(word: str, words: Iterable[str]) -> str:
     """``; did you mean 'x'?`` for a misspelt word, or nothing."""
     if len(word) > LONGEST_WORD:

@@ -7,12 +7,16 @@ that turns a number with that word into SI, and refuses a word of another dimens
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 MM = 1e-3
 """Metres in a millimetre."""
 
 DEG = math.pi / 180.0
 """Radians in a degree."""
+
+WHOLE_TURN = 360.0
+"""[deg] No part and no tool is turned farther."""
 
 # word in a file -> (SI unit, factor to SI)
 UNITS: dict[str, tuple[str, float]] = {
@@ -49,3 +53,16 @@ def to_si(word: str, si_unit: str) -> float | None:
 def words_for(si_unit: str) -> list[str]:
     """The words that a file may use for ``si_unit``."""
     return [word for word, (si, _) in UNITS.items() if si == si_unit]
+
+
+_ROUND_PARTS = tuple(math.pi / part for part in (1, 2, 3, 4, 6))
+_TWO_DECIMALS = (3.14, 1.57)
+
+
+def are_radians(values: Iterable[float]) -> bool:
+    """Whether angles, which a file states in deg, are round only in radians: each is 0 or a round part of pi written
+    with digits, and not all are 0."""
+    angles = [abs(value) for value in values if value]
+    return bool(angles) and all(
+        angle in _TWO_DECIMALS or any(abs(angle - part) < 6e-4 for part in _ROUND_PARTS) for angle in angles
+    )

@@ -106,6 +106,25 @@ def options_of_words(**words: object) -> OptionValues:
     return options
 
 
+def refuse_unusable(options: OptionValues) -> None:
+    """Raises Refusal for options, as of ``options_of_words``, that no program could be compensated with: FRC002 for a
+    force, FIL001 for a file that is not there, CEL003 for a robot."""
+    force, robot = str(options.get("force") or "").strip(), options.get("robot")
+    files = [options.get(key) for key in ("cell", "config_dat")]
+    if force.lower().endswith((".csv", *JOB_FILE)):
+        files.append(force)
+    elif force:
+        try:
+            parse_force(force)
+        except NotAForce as error:
+            raise Refusal(Finding("FRC002", f"--force {force}: {error}", help=f"write {FORM}")) from None
+    for file in files:
+        if file is not None and not os.path.isfile(str(file)):
+            raise Refusal(Finding("FIL001", "the file does not exist", str(file)))
+    if robot is not None:
+        find_robot(str(robot), None)
+
+
 def _of_file(path: Path, command_options: OptionValues, output: Path | None, outside: bool) -> Jobs:
     top = _loaded(path)
     top.only(*JOB_KEYS, *_former_in(top))

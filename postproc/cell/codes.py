@@ -50,6 +50,14 @@ CODES = define(
             action="Write lengths in mm, angles in deg and masses in kg.",
             example="`tools: {1: {x: 0.3, y: 0, z: 0.18}}` in metres.",
         ),
+        "CEL014": Code(
+            "warning",
+            "start is beyond a limit",
+            meaning="The axes before the first motion, `start`, are beyond the limits of the robot.",
+            consequence="No program starts there, and configurations that follow from it may be others.",
+            action="Write the axes of the home position, in deg, in the order and with the signs of the controller.",
+            example="`start: [0, 90, -90, 0, 90, 0]` with A2 and A3 exchanged.",
+        ),
         "CEL006": Code(
             "warning",
             "implausible tool",

@@ -12,7 +12,7 @@ import numpy as np
 from postproc.base.arrays import Floats
 from postproc.base.findings import Finding
 from postproc.base.geometry import lengths
-from postproc.base.units import DEG, MM
+from postproc.base.units import DEG, MM, are_radians
 from postproc.base.yaml_section import YamlSection
 from postproc.cell.description import Cell, Tool
 
@@ -29,9 +29,6 @@ BEHIND, BESIDE = -1.0 * MM, 150.0 * MM
 POINTS_BACK = -0.5
 """Cosine between the spindle's axis, tip-ward, and the direction from the flange to the tip, from which on the axis
 points from the tip to the spindle."""
-
-_RADIANS = np.pi / np.array([1.0, 2.0, 3.0, 4.0, 6.0])
-"""Angles that are round in degrees, and only as radians written with digits."""
 
 
 def implausible(top: YamlSection, cell: Cell) -> tuple[Finding, ...]:
@@ -78,8 +75,7 @@ def _frame(section: YamlSection) -> Iterator[Finding]:
 
 def _angles(section: YamlSection, values: list[float], key: str) -> Iterator[Finding]:
     """Angles of which each is zero or a round part of pi, written with digits."""
-    angles = np.abs([value for value in values if value])
-    if len(angles) and np.all(np.min(np.abs(angles[:, None] - _RADIANS), axis=1) < 6e-4):
+    if are_radians(values):
         degrees = ", ".join(f"{value / DEG:.4g}" for value in values)
         message = (
             f"the angles {', '.join(f'{v:g}' for v in values)} deg are round numbers if they are radians"

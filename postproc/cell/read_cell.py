@@ -65,7 +65,17 @@ AXES = {
     for k, name in enumerate("xyz")
     for sign in "+-"
 }
+_MEANT = re.compile(r"[\w.-]*cell[\w-]*\.(?:ya?ml(?:\.txt)?|json)\Z", re.IGNORECASE)
 _NUMBER = re.compile(r"[1-9][0-9]{0,5}\Z")
+
+
+def _resembling(folder: Path) -> str:
+    """The name of a file in ``folder`` that was meant as the cell; "" without one."""
+    try:
+        names = sorted(os.listdir(folder))
+    except OSError:
+        return ""
+    return next((name for name in names if _MEANT.match(name)), "")
 
 
 def find_cell(program: Path) -> Path:
@@ -76,12 +86,15 @@ def find_cell(program: Path) -> Path:
         if os.path.isfile(place / NAME):
             return place / NAME
     names = ", ".join(str(place) for place in searched)
+    help = f"put a {NAME} beside the program or above it, or name one with --cell FILE"
+    if resembling := _resembling(folder):
+        help = f"{resembling} is not read: rename it to {NAME}, or name it with --cell {resembling}"
     raise Refusal(
         Finding(
             "CEL001",
             f"no {NAME} exists for this program; {names} were searched",
             str(program),
-            help=f"put a {NAME} beside the program or above it, or name one with --cell FILE",
+            help=help,
         )
     )
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from postproc.base.arrays import Floats, frozen
-from postproc.base.units import MM
+from postproc.base.units import MM, WHOLE_TURN
 from postproc.base.yaml_section import YamlSection
 
 RANGES = {"x": "mm", "y": "mm", "z": "mm", "turn": "deg", "tool_turn": "deg", "track": "mm"}
@@ -42,6 +42,8 @@ def read_room(top: YamlSection) -> StatedRoom | None:
                 raise section.error(
                     "YML004", f"{low:g} is not below {high:g}: the range has no width", key, help
                 )
+            if unit == "deg" and max(-low, high) > WHOLE_TURN:
+                raise section.error("YML004", f"exceeds a whole turn of {WHOLE_TURN:g} deg", key)
             ranges[key] = (low, high)
     polygon = None
     if "polygon" in section:

@@ -90,6 +90,8 @@ class RenamedOption(click.Option):
 
 def number(word: str, limit: float) -> float:
     """The number that ``word`` is, at most ``limit`` in size.  Raises BadParameter."""
+    if "," in word and _NUMBER.match(word.replace(",", ".", 1)):
+        raise click.BadParameter(f"{word[:40]!r} has a decimal comma; write {word.replace(',', '.', 1)}")
     if not _NUMBER.match(word) or not math.isfinite(float(word)):
         raise click.BadParameter(f"{word[:40]!r} is not a number")
     if abs(float(word)) > limit:

@@ -67,6 +67,8 @@ def _about_surplus(words: list[str]) -> str:
                 "A force is one word: --force 0,360,560@base; write decimals with a point, and quote it if it has"
                 " blanks"
             )
+        if name.endswith(".json"):
+            return f"A force file is a CSV or YAML file, and {word} is neither: --force FILE.csv"
         if "." in word:
             return "One program is compensated in a run; compensate batch takes many"
     return ""

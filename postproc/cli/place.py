@@ -8,25 +8,31 @@ from typing import Any, TypeVar
 
 import click
 
+from postproc.base.units import WHOLE_TURN
 from postproc.cli.common import FAR, Out, number, page_option, require_suffix, result_options
 from postproc.cli.comparison_options import comparison_options
 from postproc.cli.decimal_option import Decimal
 
 Range = tuple[float, float]
+
+TURNS = ("turn", "tool_turn")
+
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
 
-def _range(_context: click.Context, _option: click.Parameter, text: str | None) -> Range | None:
+def _range(_context: click.Context, option: click.Parameter, text: str | None) -> Range | None:
     """``a:b`` in mm or deg."""
     if text is None:
         return None
     words = text.split(":")
     if len(words) != 2:
         raise click.BadParameter(f"{text[:40]!r} is no range a:b; without the option it stays where it is")
-    low, high = (number(word.strip(), FAR) for word in words)
+    angle = option.name in TURNS
+    low, high = (number(word.strip(), WHOLE_TURN if angle else FAR) for word in words)
     if not low < high:
+        help = f"write {high:g}:{low:g}" if low > high else "without the option it stays as it is"
         raise click.BadParameter(
-            f"the range {text[:40]!r} has no width: {low:g} is not below {high:g}; without the option it stays as it is"
+            f"the range {text[:40]!r} has no width: {low:g} is not below {high:g}; {help}"
         )
     return low, high
 

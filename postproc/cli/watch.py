@@ -78,7 +78,7 @@ def watch(
     of the signal that stops it.
     """
     from postproc.batching.hot_folder import HotFolder
-    from postproc.batching.job_file import options_of_words
+    from postproc.batching.job_file import options_of_words, refuse_unusable
     from postproc.report.batched import RANKS
     from postproc.report.result_keys import complete_result
 
@@ -100,6 +100,8 @@ def watch(
         shared_points=shared_points,
         strict=strict,
     )
+    with out.refusals():
+        refuse_unusable(options)
     worst = 0
 
     def listen(outcome: Outcome) -> None:

@@ -8,10 +8,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from postproc.base.arrays import Bools, Ints
-from postproc.base.findings import Finding
+from postproc.base.findings import Finding, resembles
 from postproc.toolpath import Toolpath
 
 _SWITCH = re.compile(r"COMPENSATE\s+(ON|OFF)(?![A-Z0-9_])", re.IGNORECASE)
+
+
+_MEANT = re.compile(r"([A-Z]{8,14})[\s:=_]*(?:ON|OFF?)\s*\Z", re.IGNORECASE)
 
 
 def number_cuts(in_scope: Bools, continues: Bools | None = None) -> Ints:
@@ -40,7 +43,11 @@ def feed_motions(toolpath: Toolpath) -> Bools:
 
 
 def switch_findings(file: str, toolpath: Toolpath) -> list[Finding]:
-    """The comments that start with COMPENSATE and switch nothing."""
+    """The comments that start with COMPENSATE, or a misspelling of it, and switch nothing."""
+    notes = [
+        *(note for note in toolpath.annotations if note.text.strip().upper().startswith("COMPENSATE")),
+        *(note for note in toolpath.comments if _is_meant(note.text)),
+    ]
     return [
         Finding(
             "COR011",
@@ -48,9 +55,14 @@ def switch_findings(file: str, toolpath: Toolpath) -> list[Finding]:
             file,
             note.line,
         )
-        for note in toolpath.annotations
-        if note.text.strip().upper().startswith("COMPENSATE") and not _SWITCH.match(note.text.strip())
+        for note in notes
+        if not _SWITCH.match(note.text.strip())
     ]
+
+
+def _is_meant(text: str) -> bool:
+    found = _MEANT.match(text.strip())
+    return found is not None and resembles(found[1], "COMPENSATE")
 
 
 def uncorrected_findings(

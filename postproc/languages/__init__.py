@@ -30,11 +30,17 @@ _OTHER_FILES = {
 """What to do with files of other kinds, by their suffix."""
 
 
+def unread_help(path: Path, raw: bytes) -> str:
+    """What to do with a file in which no motion is found; "" where that is not known."""
+    if b"\r" in raw and b"\n" not in raw:
+        return "its lines end in CR alone, which no controller reads: save it with Windows or Unix line ends"
+    return _OTHER_FILES.get(path.suffix.lower(), "")
+
+
 def detect(path: Path, raw: bytes) -> Dialect:
     """The dialect of a file by its name and content; Refusal (FIL009) if it is of none."""
     for dialect in DIALECTS.values():
         if dialect.claims(path, raw):
             return dialect
-    suffix, known = path.suffix.lower(), ", ".join(DIALECTS)
-    message = f"the file contains no motion of a known language ({known})"
-    raise Refusal(Finding("FIL009", message, path.name, help=_OTHER_FILES.get(suffix, "")))
+    message = f"the file contains no motion of a known language ({', '.join(DIALECTS)})"
+    raise Refusal(Finding("FIL009", message, path.name, help=unread_help(path, raw)))

@@ -117,6 +117,10 @@ class Dialect(Protocol):
     def companion_suffixes(self) -> tuple[str, ...]:
         """Suffixes, in small letters, of the files of ``companions``."""
 
+    @property
+    def suffixes(self) -> tuple[str, ...]:
+        """The endings, in small letters, of files that a controller loads as a program; none where it takes any."""
+
     def claims(self, path: Path, raw: bytes) -> bool:
         """Whether a file of this name and content is of this dialect."""
 

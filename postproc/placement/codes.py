@@ -158,6 +158,14 @@ CODES = define(
             action="Correct what the message names in the URDF, or omit --collisions.",
             example="A URDF of another robot.",
         ),
+        "PLC021": Code(
+            "warning",
+            "range of turns reads as radians",
+            meaning="Both ends of a range of turns are a round part of pi, which no angle in degrees is.",
+            consequence="The part or the tool is turned by a small part of what is meant.",
+            action="Write the range in degrees.",
+            example="--turn=-1.571:1.571 instead of --turn=-90:90.",
+        ),
         "PLC015": Code(
             "info",
             "tool may turn along the path",

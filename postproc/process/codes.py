@@ -304,6 +304,14 @@ FORCE_CODES = define(
             action="Log the forces of the compensated program and compensate the original again with them.",
             example="Logged on a robot of 1 um/N, finishing with ae 0.5 mm: 6 % too small.",
         ),
+        "FRC034": Code(
+            "warning",
+            "force is very small",
+            meaning="No component of any force of the program exceeds 2 N or 2 N m.",
+            consequence="If it is in kN, a thousandth of the correction is applied.",
+            action="State forces in N and moments in N m.",
+            example="`--force 0,0.36,0.56`.",
+        ),
         "FRC033": Code(
             "error",
             "spindle turns counter-clockwise",

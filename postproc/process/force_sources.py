@@ -12,7 +12,7 @@ import numpy as np
 from postproc.base.findings import Finding, Refusal
 from postproc.base.tables import read_table
 from postproc.cell import Cell, MotionFrames
-from postproc.process.force_comments import read_annotations
+from postproc.process.force_comments import marked_air, read_annotations
 from postproc.process.force_logs import read_log
 from postproc.process.force_table import place_column, read_force_table
 from postproc.process.operations import process_forces
@@ -147,11 +147,13 @@ class _ForceRequest:
 
 
 def _belonging(request: _ForceRequest, cell: Cell) -> SourcedForces:
-    """The force that belongs to the program, from the first source that exists."""
+    """The force that belongs to the program, from the first source that exists.  Comments that state FORCE OFF alone
+    state no force: the next source does, and motions under FORCE OFF are air."""
     program = request.program
     stated, findings = read_annotations(request.toolpath, str(program), request.rapids)
     beside = program.with_name(program.stem + ".force.csv")
-    if stated is not None:
+    elsewhere = os.path.isfile(beside) or cell.process is not None or cell.force is not None
+    if stated is not None and (stated.values.any() or not elsewhere):
         request.no_offset("the force comes from FORCE comments")
         if os.path.isfile(beside):
             message = f"{beside.name} is not used: the FORCE comments of the program come first"
@@ -169,6 +171,7 @@ def _belonging(request: _ForceRequest, cell: Cell) -> SourcedForces:
         stated, more, _ = request.explicit(
             cell.force, cell.path.parent, str(cell.path), cell.force_line, "force"
         )
+        stated = stated.without(marked_air(request.toolpath))
         source = f"cell: {cell.force}"
     else:
         raise Refusal(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -96,6 +96,19 @@ class StatedForces:
             inside = (self.profiles.wrench[:, list(channels)] != 0).any(axis=1)
             found[self.profiles.motion[inside]] = True
         return found
+
+    def without(self, motions: Bools) -> StatedForces:
+        """The same without a force on ``motions`` (N,)."""
+        if not motions.any():
+            return self
+        none = np.zeros((1, 6))
+        return replace(
+            self,
+            values=np.concatenate([self.values, none]),
+            frame=np.append(self.frame, BASE),
+            row=np.where(motions, len(self.values), self.row),
+            start=None if self.start is None else np.concatenate([self.start, none]),
+        )
 
 
 class NotAForce(ValueError):

@@ -25,6 +25,9 @@ from postproc.toolpath import Kind, Toolpath
 MOST = 1e5
 """[N, N m] No robot carries a larger force."""
 
+LEAST = 2.0
+"""[N, N m] A force of no component of which is larger moves no robot by what a tolerance is: it was written in kN."""
+
 JUMP = float(2 * np.sin(SMOOTH_TURN / 2))
 """A force that changes by more than this share of the larger one is a step: as much as a turn of SMOOTH_TURN makes."""
 
@@ -208,10 +211,14 @@ def turn_to_robot_axes(
     carries = stated.acts & ~is_air(toolpath)
     if not np.any(carries):
         return Wrenches.zero(len(toolpath), source, findings)
-    if np.abs(stated.values).max() > MOST or np.abs(stated.start_values).max() > MOST:
-        largest = max(np.abs(stated.values).max(), np.abs(stated.start_values).max())
+    largest = max(np.abs(stated.values).max(), np.abs(stated.start_values).max())
+    if largest > MOST:
         message = f"{source}: no robot carries a force of {largest:.3g} N (or N m)"
         raise Refusal(Finding("FRC002", message, file, help="state forces in N and moments in N m"))
+    if 0 < largest < LEAST:
+        message = f"the largest force is {largest:.3g} N (or N m), as if it were in kN"
+        help = f"forces are in N: in kN this would be {1000 * largest:.3g}"
+        findings = (*findings, Finding("FRC034", message, file, help=help))
     _check_world(stated, carries, toolpath, frames, file)
     path_length = PathLength(toolpath, frames)
     runs = MotionRuns(path_length, carries)

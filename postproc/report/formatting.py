@@ -36,8 +36,10 @@ def shown_unit(unit: str) -> tuple[str, float]:
 
 
 def in_decimals(value: float | None, decimals: int, missing: str = "-") -> str:
-    """``value`` with so many decimals; ``missing`` where there is none."""
-    return missing if value is None or not math.isfinite(value) else f"{value:.{decimals}f}"
+    """``value`` with so many decimals, a zero without a sign; ``missing`` where there is none."""
+    if value is None or not math.isfinite(value):
+        return missing
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"
 
 
 def fixed(value: float, interval: float) -> str:

@@ -16,6 +16,7 @@ from postproc.base.arrays import Floats
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
 from postproc.placement.room import FREEDOMS, UNITS, Room
+from postproc.report.formatting import in_decimals
 from postproc.report.placement_spin import WORTH as SPIN_WORTH
 from postproc.report.placement_spin import SpinFigures, spin_sentence
 from postproc.report.report import Spread
@@ -329,6 +330,10 @@ def facts(done: Placement) -> Iterator[tuple[str, str]]:
     if done.places:
         words = f"{done.looked} placements by {done.searched} places of the paths"
         yield "search", f"{words}; the listed ones on all {done.checked}"
+        yield (
+            "regret",
+            "share by which another place is better, in the worst sense, if the force is turned by 20 deg",
+        )
     if words := spin_words(done):
         yield "tool turn", words
     yield "result", verdict(done)
@@ -354,16 +359,16 @@ def _places(done: Placement) -> Table:
         table.add_column(head, justify="right")
     rows = [("now", done.present), *((str(k + 1), one) for k, one in enumerate(done.places))]
     for name, one in rows:
-        place = [f"{one.place[i] / UNITS[i]:.{2 if UNITS[i] == DEG else 1}f}" for i in free]
+        place = [in_decimals(one.place[i] / UNITS[i], 2 if UNITS[i] == DEG else 1) for i in free]
         bound = ">" if one.lower_bound else ""
         rough = "-" if math.isnan(one.score) else f"~{one.score / MM:.3f}"
         cells = [
-            _cell(one.across.max / MM, 3) if one.exact else rough,
-            _cell(one.error.max / MM, 3),
-            _cell(one.error.rms / MM, 3),
-            bound + _cell(one.uncertainty / MM, 3),
-            _cell(one.limit_deg, 1),
-            _cell(one.singular_deg, 1),
+            in_decimals(one.across.max / MM, 3) if one.exact else rough,
+            in_decimals(one.error.max / MM, 3),
+            in_decimals(one.error.rms / MM, 3),
+            bound + in_decimals(one.uncertainty / MM, 3),
+            in_decimals(one.limit_deg, 1),
+            in_decimals(one.singular_deg, 1),
             "-" if math.isnan(one.regret) else f"{one.regret:.0%}",
         ]
         table.add_row(name, *place, *cells)
@@ -377,9 +382,9 @@ def _alone(done: Placement) -> Table:
     for one in done.alone:
         at = FREEDOMS.index(one.name)
         unit = "deg" if UNITS[at] == DEG else "mm"
-        value = "-" if math.isnan(one.value) else f"{one.value / UNITS[at]:.1f} {unit}"
+        value = "-" if math.isnan(one.value) else f"{in_decimals(one.value / UNITS[at], 1)} {unit}"
         table.add_row(
-            one.name.replace("_", " "), value, _cell(one.ratio, 2) if not math.isnan(one.ratio) else "-"
+            one.name.replace("_", " "), value, in_decimals(one.ratio, 2) if not math.isnan(one.ratio) else "-"
         )
     return table
 
@@ -414,7 +419,3 @@ def spin_words(done: Placement) -> str:
     return (
         f"a tool that turns about its spindle along the path could bring {now:.3f} to {least:.3f} mm at most"
     )
-
-
-def _cell(value: float, decimals: int) -> str:
-    return f"{value:.{decimals}f}" if math.isfinite(value) else "-"

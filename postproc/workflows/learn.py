@@ -34,6 +34,7 @@ from postproc.report.learned import Learned, LearnedPart, learned_csv
 from postproc.report.report import exit_code, in_order_of_place, json_bytes
 from postproc.robot.description import robot_of
 from postproc.workflows.cell_tool_errors import tool_displacement
+from postproc.workflows.kinds import PART, check_kind
 from postproc.workflows.learn_commands import cutting_file
 from postproc.workflows.learn_corners import corner_error
 from postproc.workflows.learn_history import (
@@ -84,6 +85,8 @@ def learn(request: LearnRequest, stage: Stage = silent) -> Learned:
 def _learn(request: LearnRequest, stage: Stage) -> Learned:
     main = request.main
     stage("reading")
+    for path in request.measured:
+        check_kind(path, PART)
     named = [read_measured_part(path) for path in request.measured]
     _check_parts(named)
     job = read_job(main)

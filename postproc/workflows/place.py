@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from postproc.base.arrays import Floats
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import Inputs, noted
 from postproc.base.paged_memory import large_arrays_in_files
-from postproc.base.units import DEG
 from postproc.output.atomic_write import write_atomically
-from postproc.placement.collisions import CollisionShapes, colliding_rows
+from postproc.placement.collisions import CollisionShapes, first_collision
+from postproc.placement.margin_words import margin_words, reach_shortfall, reach_words
 from postproc.placement.room import FREEDOMS, UNITS
-from postproc.placement.score_places import score_places
+from postproc.placement.score_places import joint_margins, score_places
 from postproc.placement.search_places import SearchResult, distinct, search_places
 from postproc.report.placement import PlacedFigures, Placement
 from postproc.report.placement_spin import spin_sentence
@@ -27,13 +27,11 @@ from postproc.workflows.place_exact import exact_figures
 from postproc.workflows.place_feed import feed_turns
 from postproc.workflows.place_problem import PlaceProblem, PlaceRequest, place_problem, stated_direction
 from postproc.workflows.place_spin import SpunPrograms, spin_programs
+from postproc.workflows.place_units import metres_help, radian_ranges, room_elsewhere
 from postproc.workflows.preparation import Stage, silent
 
 POOL = 1500
 """Places that the regret is taken against."""
-
-METRES = 10.0
-"""[mm] All ranges that lie within so little are taken for metres."""
 
 EXACT = 20_000
 """Places on paths up to which every listed place is predicted as the main job does; of more, the best one and the
@@ -191,52 +189,37 @@ def _no_place(problem: PlaceProblem, result: SearchResult, dropped: list[Finding
     near = result.pool.places[result.pool.order()[:1]]
     whole = score_places(problem.model, problem.motions, room, problem.scoring, near, detailed=True)
     assert whole.lack is not None
-    assert whole.limit is not None
-    assert whole.singular is not None
     at = int(whole.lack[0].argmax())
-    line, limit, singular = (
-        int(problem.motions.line[at]),
-        float(whole.limit[0, at] / DEG),
-        float(whole.singular[0, at] / DEG),
-    )
-    file = str(request.programs[int(problem.motions.program[at])])
     where = ", ".join(
         f"{name} {near[0, i] / UNITS[i]:.1f}" for i, name in enumerate(FREEDOMS) if i in room.free
     )
-    hits = (
-        colliding_rows(problem.shapes, problem.model, problem.motions, near)
-        if isinstance(problem.shapes, CollisionShapes) and not whole.lack[0].any()
-        else np.array([-1])
-    )
-    if hits[0] >= 0:
-        line, file = (
-            int(problem.motions.line[hits[0]]),
-            str(request.programs[int(problem.motions.program[hits[0]])]),
-        )
-        what = "collides"
-    elif not np.isfinite(limit):
-        what = "is out of reach"
-    elif limit < request.limit_margin:
-        what = f"is {limit:.1f} deg from the limit of an axis (margin {request.limit_margin:g} deg)"
-    elif singular < request.singularity_margin:
-        what = f"is {singular:.1f} deg from a singularity (margin {request.singularity_margin:g} deg)"
+    hit = None
+    if isinstance(problem.shapes, CollisionShapes) and not whole.lack[0].any():
+        q, _, _ = joint_margins(problem.model, problem.motions, near)
+        hit = first_collision(problem.shapes, q[0])
+    if hit is not None:
+        at, (one, other) = hit
+        what = f"{one} collides with {other}"
     else:
-        what = "cannot be followed"
+        what = _lacking(problem, near, at)
+    line, file = int(problem.motions.line[at]), str(request.programs[int(problem.motions.program[at])])
     count = int((whole.lack[0] > 0).sum())
     message = (
-        f"none of {result.looked} places is feasible; at the one nearest to it ({where}) this motion {what}"
-        + (f", and {count - 1} more places of the programs lack too" if count > 1 else "")
+        f"none of {result.looked} places is feasible; at the nearest one ({where}) {what} in this motion"
     )
-    return Finding("PLC002", message, file, line, help=_metres(request.ranges))
+    if count > 1:
+        message += f", and {count - 1} other places of the paths are not feasible either"
+    return Finding("PLC002", message, file, line, help=metres_help(request.ranges) or room_elsewhere(room))
 
 
-def _metres(ranges: Mapping[str, tuple[float, float]]) -> str:
-    """A help where all lengths of ``ranges`` [mm] are those of metres; "" otherwise."""
-    lengths = {name: ranges[name] for name in ("x", "y", "z") if name in ranges}
-    if not lengths or any(max(-low, high) >= METRES for low, high in lengths.values()):
-        return ""
-    name, (low, high) = next(iter(lengths.items()))
-    return f"ranges are in mm: for metres write --{name} {1000 * low:g}:{1000 * high:g}"
+def _lacking(problem: PlaceProblem, near: Floats, at: int) -> str:
+    """Which limit the motion ``at`` of the search violates most with the part at ``near`` (1, 6)."""
+    request, motions, robot = problem.request, problem.motions, problem.model.robot
+    q, limit, singular = joint_margins(problem.model, motions, near)
+    if not np.isfinite(limit[0, at]):
+        return reach_words(float(reach_shortfall(robot, motions.flanges(near))[at]))
+    margins = (request.limit_margin, request.singularity_margin)
+    return margin_words(robot, q[0, at], float(singular[0, at]), margins) or "the path cannot be followed"
 
 
 def _findings(
@@ -251,6 +234,7 @@ def _findings(
             f" singularity {present.singular_deg:.1f} deg"
         )
         found.append(Finding("PLC006", message, str(request.programs[0]), present.limit_line))
+    found += radian_ranges(problem.room, cell)
     edges = problem.room.at_edge(best.place)
     if edges:
         found.append(Finding("PLC007", f"the best place is at the edge of: {', '.join(edges)}", cell))

@@ -75,18 +75,10 @@ def _check(ready: Prepared, request: PlaceRequest) -> None:
     """Raises Refusal PLC002 for the first motion that is not feasible, whose path is closer to a limit than it may be,
     or whose configuration is not the stated one."""
     task, margins = ready.task, motion_margins(ready.task)
-    for values, least, what in (
-        (margins.limit, request.limit_margin, "the limit of an axis"),
-        (margins.singular, request.singularity_margin, "a singularity"),
-    ):
-        at = int(values.argmin())
-        if values[at] < least * DEG:
-            angle = values[at] / DEG
-            message = f"this motion is {angle:.1f} deg from {what} (margin {least:g} deg)"
-            if not np.isfinite(angle):
-                message = "this motion is out of reach"
-            line = int(task.toolpath.line[margins.rows[at]])
-            raise Refusal(Finding("PLC002", message, task.file, line))
+    found = margins.lack(ready.robot, (request.limit_margin, request.singularity_margin))
+    if found is not None:
+        row, words = found
+        raise Refusal(Finding("PLC002", f"in this motion {words}", task.file, int(task.toolpath.line[row])))
     if len(margins.wrong):
         message = "the stated configuration (S, T) of this motion is not one that reaches it"
         raise Refusal(Finding("PLC002", message, task.file, int(task.toolpath.line[margins.wrong[0]])))

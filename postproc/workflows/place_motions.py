@@ -13,9 +13,11 @@ from postproc.base.units import DEG, MM
 from postproc.cell import Cell
 from postproc.compensation.desired_path import DesiredPath
 from postproc.compensation.problem import CompensationProblem
+from postproc.placement.margin_words import margin_words, reach_shortfall, reach_words
 from postproc.placement.part_motions import PartMotions
 from postproc.placement.singularity import singularity_angle
 from postproc.robot.axis_track import status_matches
+from postproc.robot.description import Robot
 from postproc.robot.external_axes import TRACK, own_column
 from postproc.robot.geometries import SerialArm
 from postproc.robot.inverse import inverse
@@ -32,13 +34,28 @@ MOST_INNER = 400
 class MotionMargins:
     """Of all places that a program leads to: limit (M,), singular (M,) [rad]: distances from the next axis limit and
     the next singularity, -inf out of reach, the rows (M,) they belong to, and the joint values q (M, n) there, 0 out
-    of reach; wrong (K,): rows whose configuration is not the stated one."""
+    of reach; short (M,) [m]: by how much a target is out of reach, NaN where the arm does not show it; wrong (K,): rows
+    whose configuration is not the stated one."""
 
     limit: Floats
     singular: Floats
     rows: Ints
     q: Floats
+    short: Floats
     wrong: Ints
+
+    def lack(self, robot: Robot, margins: tuple[float, float]) -> tuple[int, str] | None:
+        """The row whose place lacks most of ``margins`` [deg] to limits and singularities, and in words what; None
+        where every place keeps them."""
+        for values, least in ((self.limit, margins[0]), (self.singular, margins[1])):
+            at = int(values.argmin())
+            if not values[at] < least * DEG:
+                continue
+            if np.isfinite(values[at]):
+                return int(self.rows[at]), margin_words(robot, self.q[at], float(self.singular[at]), margins)
+            at = int(np.where(np.isfinite(values), -1.0, np.nan_to_num(self.short)).argmax())
+            return int(self.rows[at]), reach_words(float(self.short[at]))
+        return None
 
 
 def placed_rows(task: CompensationProblem) -> Bools:
@@ -53,13 +70,15 @@ def motion_margins(task: CompensationProblem) -> MotionMargins:
     rows = np.flatnonzero(placed_rows(task))
     inner, share = inner_points(task.desired_path, rows)
     ends = np.where(track.reachable[rows, None], track.q[rows], np.nan)
-    flange = task.desired_path.at(inner, share) @ task.tool[inner].inverse()
-    if (placed := task.robot_from_path(inner, share)) is not None:
-        flange = placed @ flange
+    flange = _flanges(task, inner, share)
     between = inverse(robot.nominal, flange, track.status[inner], task.q_reference(inner, share)).q
     q, every = np.concatenate([ends, between]), np.concatenate([rows, inner])
     reached = np.isfinite(q).all(axis=1)
     q = np.where(reached[:, None], q, 0.0)
+    lost, short = np.flatnonzero(~reached), np.zeros(len(every))
+    if len(lost):
+        shares = np.concatenate([np.ones(len(rows)), share])[lost]
+        short[lost] = reach_shortfall(robot, _flanges(task, every[lost], shares))
     low, high = robot.limits.T
     room = np.minimum(q - low, high - q)
     turns = np.array([joint.kind == "revolute" for joint in robot.joints])
@@ -70,8 +89,17 @@ def motion_margins(task: CompensationProblem) -> MotionMargins:
         np.where(reached, singularity_angle(robot, q), -np.inf),
         every,
         q,
+        short,
         np.flatnonzero(wrong | (~track.turn_matches & placed_rows(task) & (path.kind == Kind.PTP))),
     )
+
+
+def _flanges(task: CompensationProblem, rows: Ints, share: Floats) -> Poses:
+    """(M) where the flange is wanted at ``share`` (M,) of the paths of the motions ``rows`` (M,), in the robot's own
+    base."""
+    flange = task.desired_path.at(rows, share) @ task.tool[rows].inverse()
+    placed = task.robot_from_path(rows, share)
+    return flange if placed is None else placed @ flange
 
 
 def inner_points(desired_path: DesiredPath, rows: Ints) -> tuple[Ints, Floats]:

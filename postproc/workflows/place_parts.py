@@ -23,6 +23,7 @@ from postproc.report.report import exit_code, in_order_of_place, json_bytes
 from postproc.workflows.place_collisions import checked_shapes, shape_findings
 from postproc.workflows.place_exact import exact_figures
 from postproc.workflows.place_problem import PlaceProblem, PlaceRequest, place_problem
+from postproc.workflows.place_units import metre_places, radian_places
 from postproc.workflows.preparation import Stage, silent
 
 DECIMALS = 3
@@ -68,6 +69,7 @@ def _assign(request: AssignRequest, inputs: Inputs, stage: Stage) -> PartAssignm
     names = list(request.places)
     shapes = [problem.shapes for problem in problems]
     findings = [one for problem in problems[:1] for one in shape_findings(problem.shapes, problem.prepared)]
+    findings += radian_places(request.places, str(problems[0].moved.cell.path))
     for k in np.flatnonzero(chosen < 0).tolist():
         findings.append(
             _without(pairs[k * count : (k + 1) * count], common.objective, str(common.programs[k]))
@@ -106,7 +108,8 @@ def _pair(problem: PlaceProblem, part: int, name: str, stated: tuple[float, floa
     if isinstance(figures, PlacedFigures):
         return Pair(part, name, figures)
     message = f"at place {name}: {figures.message}"
-    return Pair(part, name, None, replace(figures, message=message))
+    help = metre_places({name: stated}).get(name, figures.help)
+    return Pair(part, name, None, replace(figures, message=message, help=help))
 
 
 def _without(pairs: list[Pair], objective: str, program: str) -> Finding:

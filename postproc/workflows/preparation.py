@@ -22,7 +22,7 @@ from postproc.compensation.lost_motion import add_lost_motion
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.ramped_forces import add_force_ramps
 from postproc.effects import Conditions
-from postproc.languages import DIALECTS, detect
+from postproc.languages import DIALECTS, detect, unread_help
 from postproc.languages.dialect import Dialect, Program, ReadingSettings, read_with_siblings
 from postproc.model import StiffnessModel
 from postproc.process import Wrenches, is_no_force, not_requested, wrenches
@@ -42,7 +42,7 @@ from postproc.workflows.cell_force_factors import factored
 from postproc.workflows.cell_tool_errors import cell_tool_displacement
 from postproc.workflows.correction_mode import corrected_model, mode_findings, temperature_rise, touch_off
 from postproc.workflows.ramp_lengths import early_shares, ramp_lengths
-from postproc.workflows.reading_findings import configuration_findings, reader_findings
+from postproc.workflows.reading_findings import configuration_findings, reader_findings, start_findings
 
 Stage = Callable[[str], None]
 """Receives the name of each stage as it starts."""
@@ -219,10 +219,9 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
     path = completed(read.toolpath, cell, robot, request.program)
     program = replace(read, toolpath=path)
     if not len(path) and not is_no_force(request.force):
-        raise Refusal(
-            Finding("FIL009", f"the file contains no motion (read as {dialect.name})", str(request.program)),
-            *program.findings,
-        )
+        message, raw = f"the file contains no motion (read as {dialect.name})", read.documents[0].raw
+        help = unread_help(request.program, raw)
+        raise Refusal(Finding("FIL009", message, str(request.program), help=help), *program.findings)
     external = External.of(path, cell.external_axes, robot, cell.robot_base)
     frames = frames_of(cell, path, request.program, external)
     base, tool, start = frames.base_in_robot, frames.tool_in_flange, _start(cell, robot)
@@ -271,6 +270,7 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
         task = replace(task, known_error=known)
     findings = [
         *cell.findings,
+        *start_findings(cell, robot, start),
         *tool_findings,
         *reader_findings(program, path),
         *orientation_findings,

@@ -122,6 +122,7 @@ def _compensate(request: Request, stage: Stage) -> Report:
     refuse_without_force(request, ready)
     stage("correcting")
     target = _target(request)
+    _refuse_suffix(target, ready)
     excluded: dict[int, Finding] = {}
     least: dict[tuple[int, float], int] = {}
     while True:
@@ -319,6 +320,15 @@ def _target(request: Request) -> Path:
     if os.path.isdir(request.output) or (request.program.suffix and not request.output.suffix):
         return request.output / request.program.name
     return request.output
+
+
+def _refuse_suffix(target: Path, ready: Prepared) -> None:
+    """Raises Refusal FIL014 where the controller would not load a file of this name, and the program's own it may."""
+    known, own = ready.dialect.suffixes, ready.program.documents[0].path.suffix
+    if known and target.suffix.lower() not in (*known, own.lower()):
+        message = f"a {ready.dialect.family} program ends in {' or '.join(known)}, and the output in {target.suffix!r}"
+        help = f"name it {target.with_suffix(own).name}"
+        raise Refusal(Finding("FIL014", message, str(target), help=help))
 
 
 def _output_paths(program: Program, target: Path) -> list[Path]:

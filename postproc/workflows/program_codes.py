@@ -289,5 +289,13 @@ CODES = define(
             action="Name a folder with -o instead of -.",
             example="`compensate - -o - --stdin-name taught.src --force` of a program with points in taught.dat.",
         ),
+        "FIL014": Code(
+            "error",
+            "output has an ending that no controller loads",
+            meaning="The name after -o does not end as programs of this language do.",
+            consequence="The controller would not find the program, or not take it for one.",
+            action="Name the output with the ending that the message proposes.",
+            example="`compensate panel.src -o panel.txt`.",
+        ),
     }
 )

@@ -7,9 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from postproc.base.arrays import Floats
 from postproc.base.findings import Finding, Topic
+from postproc.base.units import DEG, MM
+from postproc.cell import Cell
 from postproc.languages.dialect import Program
 from postproc.robot.axis_track import AxisTrack, status_matches
+from postproc.robot.description import Robot
 from postproc.toolpath import Kind, Toolpath
 
 
@@ -22,6 +26,21 @@ def reader_findings(program: Program, path: Toolpath) -> list[Finding]:
         more = f" ({len(lost)} motions)" if len(lost) > 1 else ""
         findings.append(replace(lost[0], message=lost[0].message + more))
     return findings
+
+
+def start_findings(cell: Cell, robot: Robot, start: Floats | None) -> list[Finding]:
+    """CEL014 where the cell's start (n,) [rad, m] is beyond the limit of an axis: no program begins there."""
+    if start is None or not cell.start_line:
+        return []
+    low, high = robot.limits.T
+    beyond = np.flatnonzero((start < low - 1e-9) | (start > high + 1e-9))
+    if not len(beyond):
+        return []
+    joint = robot.joints[beyond[0]]
+    unit, word = (DEG, "deg") if joint.kind == "revolute" else (MM, "mm")
+    value, *ends = (float(one[beyond[0]] / unit) + 0.0 for one in (start, low, high))
+    message = f"start: {joint.name} is {value:g} {word}, and its limits are {ends[0]:g} .. {ends[1]:g} {word}"
+    return [Finding("CEL014", message, str(cell.path), cell.start_line)]
 
 
 def configuration_findings(program: Path, path: Toolpath, track: AxisTrack) -> list[Finding]:

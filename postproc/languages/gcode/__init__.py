@@ -42,6 +42,10 @@ class GcodeDialect:
         return "G-code"
 
     @property
+    def suffixes(self) -> tuple[str, ...]:
+        return ()
+
+    @property
     def letters(self) -> bytes:
         """Those of coordinates, of G and F that hold for inserted blocks too, and of CIP and EX."""
         return b"ABCEFGIJKPRXYZ"

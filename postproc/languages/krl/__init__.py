@@ -36,6 +36,7 @@ class KrlDialect:
     family = "KRL"
     letters = b"ABCDEFGHIJKLMNOPQRSTUVWXYZ"  # points have names
     companion_suffixes: tuple[str, ...] = (".dat",)
+    suffixes: tuple[str, ...] = (".src", ".sub")
 
     def claims(self, path: Path, raw: bytes) -> bool:
         return path.suffix.lower() == ".src" or _CLAIM.search(raw) is not None

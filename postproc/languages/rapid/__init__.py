@@ -23,7 +23,6 @@ _MODULE = re.compile(
     rb"^(?:\xef\xbb\xbf)?[ \t]*+MODULE[ \t]++[A-Za-z][A-Za-z0-9_]*+[ \t]*+(?:\(|!|\r?$)", re.I | re.M
 )
 _ROUTINE = re.compile(rb"^[ \t]*+(?:LOCAL[ \t]++)?PROC[ \t]++[A-Za-z][A-Za-z0-9_]*+[ \t]*+\(", re.I | re.M)
-_SUFFIXES = frozenset([".mod", ".modx", ".prg", ".sys", ".sysx"])
 
 
 class RapidDialect(SingleFileDialect):
@@ -31,13 +30,14 @@ class RapidDialect(SingleFileDialect):
 
     name = "rapid"
     family = "RAPID"
+    suffixes: tuple[str, ...] = (".mod", ".modx", ".prg", ".sys", ".sysx")
     letters = b"ABCDEFGHIJKLMNOPQRSTUVWXYZ\\;"  # of inserted motions, and of Offs and RelTool
 
     def claims(self, path: Path, raw: bytes) -> bool:
         start = raw[:BEGIN]
         if _MODULE.search(start) is not None:
             return True
-        return path.suffix.lower() in _SUFFIXES and _ROUTINE.search(start) is not None
+        return path.suffix.lower() in self.suffixes and _ROUTINE.search(start) is not None
 
     def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
         from postproc.languages.rapid import module_reader  # takes its time to load

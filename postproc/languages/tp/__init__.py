@@ -32,6 +32,7 @@ class TpDialect(SingleFileDialect):
 
     name = "tp"
     family = "Fanuc TP"
+    suffixes: tuple[str, ...] = (".ls",)
     letters = b'ABCDEFGHIJKLMNOPQRSTUVWXYZ;%"'  # of inserted motions and points
 
     def claims(self, path: Path, raw: bytes) -> bool:

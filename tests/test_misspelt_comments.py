@@ -1,0 +1,92 @@
+"""Comments that were meant to speak to this tool, and do not: they are told, never passed over."""
+
+from __future__ import annotations
+
+import pytest
+from conftest import LINES
+
+CUT = LINES.index(";FORCE -360 50 560 @base")
+OFF = LINES.index(";FORCE OFF")
+
+
+def changed(job, at, comment):
+    lines = list(LINES)
+    lines[at] = comment
+    job.write(lines)
+
+
+@pytest.mark.parametrize(
+    "comment",
+    [
+        *(";FORCE: -360 50 560", ";FORCE=-360,50,560", ";FORCE-360 50 560", ";FORCE0 360 560"),
+        *(
+            ";FORSE -360 50 560",
+            ";FROCE -360 50 560 @base",
+            ";FORC 0 360 560",
+            ";forces 0 360 560",
+            ";FORCE_0 360 560",
+        ),
+        *(";FORCE X-360 Y50 Z560", ";FORCE FX=0 FY=360 FZ=560", ";Forse: 0, 360, 560"),
+    ],
+)
+def test_a_force_in_another_spelling_is_refused(compensate, job, comment):
+    changed(job, CUT, comment)
+    done = compensate(job.program, "--force")
+    assert done.code == 1
+    assert f"part.src:{CUT + 1} FRC002" in done.err
+    assert "write FORCE fx fy fz" in done.err
+    assert job.nothing_written()
+
+
+@pytest.mark.parametrize(
+    "comment", [";FORCE OF", ";FORCE OFFF", ";FORCE 0FF", ";FORCE: OFF", ";FORSE OFF", ";FORCE=OFF"]
+)
+def test_a_force_that_would_not_end_is_refused(compensate, job, comment):
+    changed(job, OFF, comment)
+    done = compensate(job.program, "--force")
+    assert done.code == 1
+    assert f"part.src:{OFF + 1} FRC002" in done.err
+    assert job.nothing_written()
+
+
+@pytest.mark.parametrize(
+    "comment",
+    [
+        *(
+            ";source 1 2 3",
+            ";forged 12.3.2024 by hand",
+            ";FORMER 3",
+            ";X 1 Y 2 Z 3",
+            ";Forward",
+            ";office 1 2 3",
+        ),
+        *(";FORK OF THE HOUSE", ";PARSE 0 1 2"),
+    ],
+)
+def test_other_comments_are_comments(compensate, job, comment):
+    changed(job, 1, comment)
+    assert compensate(job.program, "--force", "--dry-run").code == 0
+
+
+@pytest.mark.parametrize(
+    "comment", [";COMPENSATION OFF", ";COMPENSTE OFF", ";COMPENSATE: OFF", ";COMPENSATE OF"]
+)
+def test_a_switch_that_does_not_switch_is_reported(compensate, job, comment):
+    changed(job, 1, comment)
+    done = compensate(job.program, "--force", "--json", "-")
+    assert done.code == 3
+    assert ("COR011", 2) in [(one["code"], one["line"]) for one in done.json["findings"]]
+
+
+def test_comments_that_only_end_a_force_state_none(compensate, job):
+    """Where FORCE OFF alone is stated, the force of the cell holds for the motions that are not under it."""
+    changed(job, CUT, ";nothing")
+    lines = [line for line in job.program.read_text().splitlines() if line != ";FORCE 0 200 0"]
+    job.write(lines)
+    assert compensate(job.program, "--force", "--dry-run", "--json", "-").json["verdict"] == "not_corrected"
+    with (job.folder / "cell.yaml").open("a") as stream:
+        stream.write("force: 0,360,560\n")
+    done = compensate(job.program, "--force", "--dry-run", "--json", "-")
+    assert done.json["force"]["max_n"] == pytest.approx(665.7, abs=0.1)
+    stated = compensate(job.program, "--force=0,360,560", "--dry-run", "--json", "-")
+    assert 0 < done.json["corrected"] < stated.json["corrected"]
