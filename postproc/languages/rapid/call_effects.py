@@ -14,6 +14,7 @@ from postproc.languages.rapid.syntax_tree import (
     Expression,
     FunctionCall,
     Instruction,
+    Leave,
     Name,
     NotUnderstood,
     NumberLiteral,
@@ -104,6 +105,11 @@ class ModeChanges(NamedTuple):
             state.checks_joint = None
         if self.speaks:
             state.force = state.switch = VARYING
+
+
+def leaving_words(body: tuple[Statement, ...]) -> set[bytes]:
+    """RETURN and other words that leave statements, or start them again."""
+    return {one.word for one in walk(body) if isinstance(one, Leave)}
 
 
 def mode_changes(bodies: Iterable[tuple[Statement, ...]]) -> ModeChanges:

@@ -133,7 +133,8 @@ def _continues(rows: ModuleRows) -> Bools:
     """(N,) each motion surely starts where the row before it ends, and no other motion starts there."""
     first = [row for row in rows.first[:-1].tolist() if row < rows.never_from]
     before = [rows.before(row) for row in first]
-    found = follow_on(np.arange(len(rows)) < rows.never_from, first, before)
+    joined = (np.arange(len(rows)) < rows.never_from) & (not rows.strays)
+    found = follow_on(joined, first, before)
     many = {one for fact in rows.facts for one in fact.before if isinstance(one, Meeting)}
     crowd = np.array(rows.rows_of(many, set()), np.int64)
     found[crowd[crowd < len(rows) - 1] + 1] = False

@@ -13,7 +13,7 @@ from dataclasses import replace
 from postproc.languages.core.motion_sources import Meeting, Source
 from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.core.waits import Waits
-from postproc.languages.rapid.call_effects import CallEffects, ModeChanges, mode_changes
+from postproc.languages.rapid.call_effects import CallEffects, ModeChanges, leaving_words, mode_changes
 from postproc.languages.rapid.declared_data import DeclaredData, Usage, first_value, names_in, walk
 from postproc.languages.rapid.evaluation import Evaluator, is_component, unknown_record
 from postproc.languages.rapid.flow_graph import FlowGraph, Step
@@ -40,13 +40,11 @@ from postproc.languages.rapid.syntax_tree import (
     DataDeclaration,
     Expression,
     Instruction,
-    Leave,
     Module,
     NotUnderstood,
     PlainMotions,
     RapidRoutine,
     Remark,
-    Statement,
 )
 from postproc.languages.rapid.values import UnknownData, Value, plain, replaced, truth_of
 from postproc.toolpath import ArcFrame, Kind, OrientationMode
@@ -65,11 +63,6 @@ DEEPEST = 12
 def _length(statement: object) -> int:
     """The statements that a statement counts for."""
     return len(statement) if isinstance(statement, PlainMotions) else 1
-
-
-def leaving_words(body: tuple[Statement, ...]) -> set[bytes]:
-    """RETURN and other words that leave statements, or start them again."""
-    return {one.word for one in walk(body) if isinstance(one, Leave)}
 
 
 class TooLong(Exception):
@@ -284,8 +277,8 @@ class Propagation:
         elif name in MOTIONS:
             if self._runner.recording:
                 self._record(step.start, motion_fact(step, MOTIONS[name], state, self._evaluator(state)))
-            self._moved(step.start, state)
-            if name.endswith(b"SYNC"):
+            self._moved(step, step.start, state)
+            if MOTIONS[name].calls and self.usage.synchronous_call(step) not in self.routines:
                 self.calls.setdefault(step.name, step.start)
         elif name in OTHER_MOTIONS:
             self._not_read(step, state, "this form of motion is not read")
@@ -298,7 +291,10 @@ class Propagation:
     def _setting(self, step: Instruction, state: ProgramState) -> None:
         name = step.name
         options = {argument.name for argument in step.arguments}
-        state.waits = max(state.waits, waits_at(step, self._evaluator(state)))
+        waits = waits_at(step, self._evaluator(state))
+        if state.concurrent and name == b"WAITTIME" and b"INPOS" not in options:
+            waits = min(waits, Waits.MAYBE)  # it starts with the motion, and may be over before this is
+        state.waits = max(state.waits, waits)
         if name in DISPLACING:
             state.displaced |= {name}
             if name in READERS:
@@ -332,18 +328,20 @@ class Propagation:
         """A motion of which only its place is known."""
         if self._runner.recording:
             self._record(step.start, not_read(step, OTHER, state, message))
-        self._moved(step.start, state)
+        self._moved(step, step.start, state)
 
     def _plain(self, step: PlainMotions, state: ProgramState) -> None:
         """Motions that are run one after the other."""
         if self._runner.recording:
             fact = motion_fact(step.first, MOTIONS[step.first.name], state, self._evaluator(state))
             self._record(step.start, replace(fact, lines=step))
-        self._moved(step.last, state)
+        self._moved(step.first, step.last, state)
 
-    def _moved(self, at: int, state: ProgramState) -> None:
-        """What holds after the motion at an offset."""
-        state.last, state.waits = frozenset([at]), Waits.NO
+    def _moved(self, motion: Instruction, at: int, state: ProgramState) -> None:
+        """What holds after a motion, or the last one of its kind at an offset."""
+        state.last = frozenset([at, ELSEWHERE] if self.usage.strays else [at])
+        state.waits = Waits.NO
+        state.concurrent = any(argument.name == b"CONC" for argument in motion.arguments)
 
     def _record(self, at: int, fact: MotionFact) -> None:
         """Takes up the fact of the motion at an offset."""
