@@ -72,7 +72,7 @@ def module_toolpath(
         constraints=EditConstraints(
             refused=refused,
             locked=_locked(document, rows, flow, refused),
-            no_insert_before=_whole(rows, continues, refused),
+            no_insert_before=_whole(rows, flow.mixed, continues, refused),
         ),
         orientation_control=OrientationControl(
             mode=rows.per_row([fact.orientation for fact in facts], np.int8)
@@ -199,8 +199,10 @@ def _pose(frame: FrameRef) -> Poses | None:
     return Poses.identity() if frame.number == 0 else frame.pose
 
 
-def _whole(rows: ModuleRows, continues: Bools, refused: Mapping[int, Finding]) -> dict[int, str]:
-    """Rows before which nothing can be inserted."""
+def _whole(
+    rows: ModuleRows, mixed: set[int], continues: Bools, refused: Mapping[int, Finding]
+) -> dict[int, str]:
+    """Rows before which nothing can be inserted.  mixed: offsets of comments before which others may be in force."""
     same = rows.quadrants >= 0
     same[1:] &= rows.quadrants[1:] == rows.quadrants[:-1]
     same[:1] = False
@@ -216,6 +218,8 @@ def _whole(rows: ModuleRows, continues: Bools, refused: Mapping[int, Finding]) -
             why = "it starts or carries a process whose distances count from its own start"
         elif b"T" in fact.arguments.options:
             why = "its time is stated (\\T)"
+        elif any(one.start > fact.statement.start and one.start in mixed for one in fact.remarks()):
+            why = "before the comment in its line several others may be in force"
         wordless = "" if text.target is not None and text.target.words else NO_WORDS
         for row in range(start, stop) if why or wordless else [start]:
             whole[row] = why or wordless

@@ -78,6 +78,10 @@ class MotionFact:
         """How many motions it represents."""
         return 1 if self.lines is None else len(self.lines)
 
+    def remarks(self) -> list[Remark]:
+        """The comments that are in force."""
+        return [one for one in (self.force, self.switch) if isinstance(one, Remark)]
+
     def joined(self, other: MotionFact, meeting: Meeting) -> MotionFact:
         """What holds in both executions; meeting: that of what runs before them."""
         via = self.via

@@ -31,7 +31,7 @@ from postproc.languages.rapid.instructions import (
     is_motion,
 )
 from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read, override_of, waits_at
-from postproc.languages.rapid.program_state import ELSEWHERE, START, ProgramState
+from postproc.languages.rapid.program_state import ELSEWHERE, START, VARYING, ProgramState
 from postproc.languages.rapid.routine_names import RoutineNames
 from postproc.languages.rapid.routine_runner import RoutineRunner
 from postproc.languages.rapid.syntax_tree import (
@@ -73,7 +73,7 @@ class Propagation:
     """Runs a module.  ``facts``: offset of a motion -> its fact, in the order in which they run first; ``passed``:
     comments in that order with the number of motions before each; ``calls``: name of what is not in the file -> offset
     of its first call; ``reads``: where the place of the robot is read -> the motions after which; ``unread``:
-    statements that are not understood."""
+    statements that are not understood; ``mixed``: comments before which several others may be in force."""
 
     def __init__(self, module: Module, raw: bytes) -> None:
         self.module = module
@@ -101,6 +101,7 @@ class Propagation:
         self._restarts = any(b"EXITCYCLE" in leaving_words(body) for body in bodies)
         self._numbers = KeyNumbers()
         self._meetings: defaultdict[int, Meeting] = defaultdict(Meeting)
+        self.mixed: set[int] = set()
         self.rows = 0
         self.waited: set[Source] = set()
         self._steps = MOST_STEPS + 4 * sum(_length(one) for r in module.routines for one in walk(r.body))
@@ -261,10 +262,10 @@ class Propagation:
         if self._runner.recording:
             self.passed.setdefault(step.start, (step, self.rows))
         word = step.text.split(" ")[0].split("\t")[0].split(",")[0].upper()
-        if word == "FORCE":
-            state.force = step
-        elif word == "COMPENSATE":
-            state.switch = step
+        if place := {"FORCE": "force", "COMPENSATE": "switch"}.get(word):
+            if getattr(state, place) is VARYING:
+                self.mixed.add(step.start)
+            setattr(state, place, step)
 
     def _instruction(self, step: Instruction, state: ProgramState) -> None:
         name = step.name
