@@ -27,11 +27,13 @@ from postproc.languages.rapid.syntax_tree import (
     FunctionCall,
     Index,
     Instruction,
+    Label,
     Module,
     Name,
     NotUnderstood,
     PlainMotions,
     RapidRoutine,
+    Statement,
     StringLiteral,
 )
 from postproc.languages.rapid.values import FALSE, TRUE, GroupValue, Leaf, UnknownData, Value, number_of
@@ -177,7 +179,12 @@ class Usage:
         handlers_move = False
         for routine in module.routines:
             self._called, self._set, self._mentioned = set(), set(), set()
-            for statement in walk(routine.handlers):
+            errors, others = _of_errors(routine.handlers)
+            for statement in walk(others):
+                self._statement(statement, routine)
+            self.moves.discard(routine.name)
+            self._called = set()
+            for statement in walk(errors):
                 self._statement(statement, routine)
             handlers_move |= routine.name in self.moves and b"STOREPATH" not in self._called
             self.later |= self._set
@@ -202,8 +209,13 @@ class Usage:
             one = pending.pop()
             if one not in seen:
                 seen.add(one)
-                pending += self._own if one.startswith(ANY_PROCEDURE) else self.calls.get(one, ())
+                pending += self._own if self.is_late(one) else self.calls.get(one, ())
         return seen
+
+    @staticmethod
+    def is_late(name: bytes) -> bool:
+        """Whether a call is one whose procedure a string names."""
+        return name.startswith(ANY_PROCEDURE)
 
     def _statement(self, statement: Any, routine: RapidRoutine) -> None:
         match statement:
@@ -289,6 +301,17 @@ class Usage:
                 pending += one.arguments
             elif isinstance(one, tuple):
                 pending += one
+
+
+def _of_errors(handlers: tuple[Statement, ...]) -> tuple[tuple[Statement, ...], tuple[Statement, ...]]:
+    """The statements of ERROR, and those of BACKWARD and UNDO, after which the program does not go on."""
+    parts: tuple[list[Statement], list[Statement]] = [], []
+    is_other = False
+    for one in handlers:
+        if isinstance(one, Label) and one.name in (b"ERROR", b"BACKWARD", b"UNDO"):
+            is_other = one.name != b"ERROR"
+        parts[is_other].append(one)
+    return tuple(parts[0]), tuple(parts[1])
 
 
 def _conditions(statement: Any) -> Iterator[Any]:

@@ -53,9 +53,7 @@ def _forms() -> dict[bytes, MotionForm]:
         forms[b"MOVE" + letter] = MotionForm(kind, points, options=_COMMON)
         for signal in (b"DO", b"AO", b"GO"):
             forms[b"MOVE" + letter + signal] = MotionForm(kind, points, after=2, options=_COMMON)
-        forms[b"MOVE" + letter + b"SYNC"] = MotionForm(
-            kind, points, after=1, options=_COMMON, starts_process=True, calls=True
-        )
+        forms[b"MOVE" + letter + b"SYNC"] = MotionForm(kind, points, after=1, options=_COMMON, calls=True)
         forms[b"TRIGG" + letter] = MotionForm(kind, points, (1,), options=_TRIGGERS, starts_process=True)
         for part in (b"", b"START", b"END") if kind != Kind.PTP else ():
             forms[b"ARC" + letter + part] = MotionForm(

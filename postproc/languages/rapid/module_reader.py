@@ -79,16 +79,19 @@ def _structure(document: Document, module: Module, flow: Propagation) -> list[Fi
 
 
 def _calls(document: Document, flow: Propagation) -> list[Finding]:
-    """Calls of what the file does not contain, once each."""
+    """Calls of what the file does not contain, and others that are not followed, once each."""
     return [
-        _finding(
-            document,
-            "RAP010",
-            f"{name.decode('latin-1')[:40]} is not in this file: it may move the robot",
-            at,
-        )
+        _finding(document, "RAP010", f"{name.decode('latin-1')[:40]} {_why_unread(name, flow)}", at)
         for name, at in flow.calls.items()
     ]
+
+
+def _why_unread(name: bytes, flow: Propagation) -> str:
+    if flow.usage.is_late(name):
+        return "names the procedure by a text: it may move the robot"
+    if name in flow.routines:
+        return "calls itself, is called too deep, or is not understood: not each of its runs is followed"
+    return "is not in this file: it may move the robot"
 
 
 def _finding(document: Document, code: str, message: str, at: int) -> Finding:

@@ -45,8 +45,8 @@ class ModuleRows:
 
     first (M + 1,): row of the first motion of each fact; fact_of (N,).  starts (N,): offsets of the statements; lines
     (N,): their numbers.  base, tool (N,): indices of frames, -1 where not known; quadrants, cfx (N,): -1 likewise.
-    never_from: the first row of those that never run; strays: the robot may be elsewhere before each.  problems: row -> why it cannot be corrected.  ends: offset of
-    the last motion of a fact -> its row.
+    never_from: the first row of those that never run.  strays: the robot may be elsewhere before each.  problems: row
+    -> why it cannot be corrected.  ends: offset of the last motion of a fact -> its row.
     """
 
     facts: list[MotionFact]
@@ -133,9 +133,7 @@ def module_rows(
     return rows, frames
 
 
-def _rows(
-    document: Document, run: list[MotionFact], never: list[MotionFact], strays: bool
-) -> ModuleRows:
+def _rows(document: Document, run: list[MotionFact], never: list[MotionFact], strays: bool) -> ModuleRows:
     """The rows of facts, those that run and those that never do, without frames, configurations and external axes."""
     facts = [*run, *never]
     first = sums(np.array([fact.count for fact in facts], np.int64))

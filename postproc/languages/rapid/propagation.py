@@ -32,6 +32,7 @@ from postproc.languages.rapid.instructions import (
 )
 from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read, override_of, waits_at
 from postproc.languages.rapid.program_state import ELSEWHERE, START, VARYING, ProgramState
+from postproc.languages.rapid.routine_entries import program_entries, run_again, run_aside, value_at_start
 from postproc.languages.rapid.routine_names import RoutineNames
 from postproc.languages.rapid.routine_runner import RoutineRunner
 from postproc.languages.rapid.syntax_tree import (
@@ -91,6 +92,8 @@ class Propagation:
         self.calls: dict[bytes, int] = {}
         self.reads: defaultdict[int, set[Source]] = defaultdict(set)
         self.unread: dict[int, NotUnderstood] = {}
+        self._strayed = frozenset([ELSEWHERE] if self.usage.strays else [])
+        self._again: set[bytes] = set()  # routines of which not each run is followed
         self._graphs: dict[bytes, FlowGraph] = {}
         self._effects = CallEffects(self.usage)
         self._names = RoutineNames(self.data, self.usage)
@@ -109,19 +112,12 @@ class Propagation:
 
     def run(self) -> None:
         """Follows the program from main, and every routine that nothing in the file calls.  Raises TooLong."""
-        called = set().union(*self.usage.calls.values()) if self.usage.calls else set()
-        entries = [
-            routine
-            for routine in self.module.routines
-            if routine.kind == b"PROC" and (routine.name not in called or routine.name == b"MAIN")
-        ]
-        main = self.routines.get(b"MAIN")
-        if main is None and len(entries) == 1:
-            main = entries[0]
-        entries.sort(key=lambda routine: routine is not main)
+        main, entries = program_entries(self.module, self.usage)
+        aside = run_aside(self.module, self.usage)
         for routine in entries:
-            if not self.is_unclear(routine):
-                self._enter(routine, routine is main)
+            self._enter(routine, routine is main, routine is not main and routine.name in aside)
+        for name in run_again(aside | self._again, entries, main, self.usage):
+            self._enter(self.routines[name], False, True)
 
     def is_unclear(self, routine: RapidRoutine) -> bool:
         """Whether the structure of a routine is not understood, or its name is that of several."""
@@ -133,11 +129,17 @@ class Propagation:
             graph = self._graphs[routine.name] = FlowGraph(routine.body)
         return graph
 
-    def _enter(self, routine: RapidRoutine, is_main: bool) -> None:
-        state = ProgramState(PersistentMap(self._numbers), frozenset([START if is_main else ELSEWHERE]))
+    def _enter(self, routine: RapidRoutine, is_main: bool, is_aside: bool) -> None:
+        """Runs a routine; ``is_aside``: the file itself calls it, where the flow does not show it."""
+        if routine.kind != b"PROC" or self.is_unclear(routine):
+            return
+        places = frozenset([START if is_main else ELSEWHERE]) | self._strayed
+        state = ProgramState(PersistentMap(self._numbers), places)
         for name in self.usage.assigned:
             if name in self.data and not self.data.is_constant(name):
-                state.put(name, self._value_at_start(name, is_main))
+                state.put(name, value_at_start(self.data, name, is_main))
+        if is_aside:
+            mode_changes(one.body for one in self.module.routines).lose(state, b"its caller")
         if self._aside:
             state.displaced |= {b"a trap or an error handler"}
         if is_main:
@@ -146,14 +148,6 @@ class Propagation:
         end = self._routine(routine, state, True)
         if end is not None:
             self._leave_place(end)
-
-    def _value_at_start(self, name: bytes, is_main: bool) -> Value:
-        shown = name.decode("latin-1")
-        if not is_main:
-            return UnknownData(f"{shown} is assigned elsewhere")
-        if self.data.kind_of(name) == b"PERS":
-            return UnknownData(f"{shown} has at the start the value of an earlier run")
-        return self.data.look(name)[0]
 
     def _start_again(self, main: RapidRoutine, state: ProgramState) -> None:
         """Takes in what the last run of main left, with which it starts again."""
@@ -340,7 +334,7 @@ class Propagation:
 
     def _moved(self, motion: Instruction, at: int, state: ProgramState) -> None:
         """What holds after a motion, or the last one of its kind at an offset."""
-        state.last = frozenset([at, ELSEWHERE] if self.usage.strays else [at])
+        state.last = frozenset([at]) | self._strayed
         state.waits = Waits.NO
         state.concurrent = any(argument.name == b"CONC" for argument in motion.arguments)
 
@@ -372,6 +366,7 @@ class Propagation:
     def _call(self, routine: RapidRoutine, step: Instruction, state: ProgramState) -> None:
         """Runs a routine of the file with its arguments."""
         if routine in self._names.active or len(self._names.active) >= DEEPEST or self.is_unclear(routine):
+            self._again |= self._effects.of(routine.name).routines
             self._unread_call(step, state, moves=True)
             self._lose_effects(routine.name, state)
             return
