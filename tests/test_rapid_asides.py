@@ -9,7 +9,11 @@ import pytest
 
 from postproc.base.document import Document
 from postproc.languages import DIALECTS
-from postproc.languages.dialect import Program
+from postproc.languages.dialect import Program, ReadingSettings
+from postproc.languages.rapid.flow_graph import FlowGraph
+from postproc.languages.rapid.parsing import ModuleParser
+from postproc.languages.rapid.program_state import ProgramState
+from postproc.languages.rapid.routine_runner import RoutineRunner
 
 EXTRA = "[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]"
 HEAD = f"""MODULE part
@@ -131,3 +135,33 @@ def test_nothing_is_inserted_before_a_comment_that_several_others_may_precede() 
         f"PROC main()\nMoveL p,v50,fine,t;\n{lines}ENDPROC\n"
     ).toolpath.constraints.no_insert_before
     assert sorted(straight) == [0]
+
+
+def test_a_long_block_is_not_run_again_with_the_same_state() -> None:
+    within = "n:=n+1;\n" * 20
+    text = f"{HEAD}PROC main()\nWHILE di1=1 DO\nFOR i FROM 1 TO n DO\n{within}ENDFOR\nENDWHILE\nENDPROC\nENDMODULE\n"
+    graph = FlowGraph(ModuleParser(text.encode()).file().routines[0].body)
+    ran: list[int] = []
+    version = 0
+
+    def after(_: FlowGraph, at: int, state: ProgramState) -> list[tuple[int, ProgramState]]:
+        block = graph.blocks[at]
+        ran.append(len(block.steps))
+        return [
+            (to, state) for to in ((block.follow, block.otherwise) if block.condition else (block.follow,))
+        ]
+
+    runner = RoutineRunner(after, lambda: version)
+    for count in (1, 1, 2, 3):
+        version = int(count == 2)
+        runner.start()
+        runner.run(graph, ProgramState(), count == 3)
+        assert ran.count(21) == count
+
+
+def test_a_symbol_that_may_have_been_meant_is_named() -> None:
+    text = f"MODULE m\nPROC main()\nMoveL [[1,2,3],[0,0,1,0],{EXTRA}],v50,z1,tSpindle;\nENDPROC\nENDMODULE\n"
+    for symbol, named in (("TSPINDEL", True), ("WPART", False)):
+        settings = ReadingSettings(symbols={symbol: 1.0})
+        program = DIALECTS["rapid"].read((Document(Path("part.mod"), text.encode()),), settings)
+        assert (f"the cell has the symbol {symbol}" in program.findings[0].message) is named
