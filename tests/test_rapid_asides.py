@@ -165,3 +165,25 @@ def test_a_symbol_that_may_have_been_meant_is_named() -> None:
         settings = ReadingSettings(symbols={symbol: 1.0})
         program = DIALECTS["rapid"].read((Document(Path("part.mod"), text.encode()),), settings)
         assert (f"the cell has the symbol {symbol}" in program.findings[0].message) is named
+
+
+HUGE = "[1E200,-1E308,1]"
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    "motion",
+    [
+        f"MoveL [[1,2,3],[0,0,1E200,1E308],{EXTRA}],v50,z10,t;",
+        f"MoveL RelTool([[1,2,3],[0,0,1E200,1E308],{EXTRA}],1,1,1),v50,z10,t;",
+        "MoveL p,v50,z10,[TRUE,[[0,0,200],[1E308,1,0,0]],[5,[0,0,80],[1,0,0,0],0,0,0]];",
+        f"q:=[[1,2,3],NOrient([1E200,1E308,0,0]),{EXTRA}];MoveL q,v50,z10,t;",
+        f"MoveL [{HUGE},[0,0,1,0],{EXTRA}],v50,z10,t;",
+        f"MoveC [{HUGE},[0,0,1,0],{EXTRA}],p,v50,z10,t;",
+        "MoveL RelTool(p,1E308,1E308,1E308),v50,z10,t;",
+        "MoveL RelTool(p,1,1,1\\Rx:=1E308),v50,z10,t;",
+    ],
+)
+def test_numbers_that_no_robot_has_are_refused_without_a_warning_of_numpy(motion: str) -> None:
+    path = read(f"VAR robtarget q;\nPROC main()\nMoveL p,v50,fine,t;\n{motion}\nENDPROC\n").toolpath
+    assert 1 in path.constraints.refused

@@ -5,6 +5,8 @@ from __future__ import annotations
 from codecs import BOM_UTF8
 from functools import partial
 
+import numpy as np
+
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
 from postproc.base.memory import without_garbage_collection
@@ -20,6 +22,7 @@ SYNTAX = EditSyntax(comment=b"!", numbers_after=b"[,")
 
 
 @without_garbage_collection()
+@np.errstate(over="ignore", invalid="ignore")  # numbers that no robot has are refused, of whatever size they are
 def read(documents: tuple[Document, ...], settings: ReadingSettings, fast: bool = True) -> Program:
     """The program of a file; never raises on its content.
 
