@@ -17,6 +17,8 @@ class Executed(Protocol):
     force: str | None
 
 
+ELSEWHERE = -2
+"""Among the rows after which a row runs: another place, which may be any."""
 M = TypeVar("M", bound=Executed)
 
 
@@ -42,6 +44,14 @@ def disagreements(
         row = row_of.get(motion.line)
         if row is None:
             return [*wrong, f"line {motion.line}: a motion that the reader does not have"]
+        if getattr(
+            motion, "aside", False
+        ):  # a trap or a handler runs it: what is said of its target has to hold
+            wrong += [
+                f"line {motion.line}: {one}"
+                for one in ([] if row in refused else claims(program, row, motion, -2))
+            ]
+            continue
         elsewhere = start(motion)
         at = before if elsewhere is None else elsewhere
         what = []
@@ -52,7 +62,7 @@ def disagreements(
         if path.continues[row]:
             if at != row - 1:
                 what.append(f"it starts after row {at}, not after the row before it")
-        elif at not in path.predecessors.get(row, ()):
+        elif row in path.predecessors and not {at, ELSEWHERE} & set(path.predecessors[row]):
             what.append(f"row {at} is no predecessor of row {row}")
         wrong += [f"line {motion.line}: {one}" for one in what]
         before = row

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from case_files import RAPID_CASES
 from rapid_judge.claims import disagreements
+from rapid_judge.further import FurtherWriter
 from rapid_judge.machine import Machine
 from rapid_judge.programs import Writer
 
@@ -32,11 +33,23 @@ def judged(seed: int, shown=lambda text: text) -> tuple[Program, list[str]]:
     return program, wrong
 
 
-def held(seeds: range) -> tuple[int, int]:
+def judged_further(seed: int, shown=lambda text: text) -> tuple[Program, list[str]]:
+    """As ``judged``, of programs with further forms, which are also run one after the other."""
+    text = FurtherWriter(np.random.default_rng(seed)).program()
+    program = read(shown(text))
+    wrong = []
+    for run in range(RUNS):
+        machine = Machine(text, np.random.default_rng([seed, run]))
+        for done in [machine.run()] if run % 2 else machine.cycles(3):
+            wrong += disagreements(program, done)
+    return program, wrong
+
+
+def held(seeds: range, judge=judged) -> tuple[int, int]:
     """How many motions there are, and how many of them the reader claims to know."""
     motions = known = 0
     for seed in seeds:
-        program, wrong = judged(seed)
+        program, wrong = judge(seed)
         assert not wrong, (seed, wrong[:3])
         motions += len(program.toolpath)
         known += len(program.toolpath) - len(program.toolpath.constraints.refused)
@@ -53,6 +66,18 @@ def test_every_claim_holds_in_every_execution_of_many_programs() -> None:
     motions, known = held(range(1000, 1200))
     assert motions > 1200
     assert known > 0.25 * motions
+
+
+def test_every_claim_of_further_forms_holds() -> None:
+    motions, known = held(range(5000, 5020), judged_further)
+    assert known > 0.08 * motions
+
+
+@pytest.mark.slow
+def test_every_claim_of_further_forms_holds_in_many_programs() -> None:
+    motions, known = held(range(6000, 6300), judged_further)
+    assert motions > 2000
+    assert known > 0.1 * motions
 
 
 BEYOND = [
@@ -106,3 +131,27 @@ MISREADINGS = {
 def test_a_misreading_is_found(name: str) -> None:
     old, new = MISREADINGS[name]
     assert any(judged(seed, lambda text: text.replace(old, new))[1] for seed in range(200))
+
+
+FURTHER_MISREADINGS = {
+    "stop point data": ("z10\\Inpos:=inpos50", "z10"),
+    "a concurrent wait": ("\\Conc,", ""),
+    "a routine that a motion calls": ("n3:=7;\nENDPROC", "ENDPROC"),
+    "a part of a record": ("ma{1}.at,", "ma{2}.at,"),
+    "an element": ("pv{1}", "pv{2}"),
+    "a tool that changes": (",t3", ",t1"),
+    "a moving work object": ("w4", "w1"),
+    "a work object on the robot": ("w5", "w1"),
+    "soft servos": ("SoftAct 1,20;", "SetDO do5,1;"),
+    "an offset of axes": ("EOffsSet e1;", "SetDO do5,1;"),
+    "a call of a text": ('%"sub"+"2"%;', "SetDO do5,1;"),
+    "a call of itself": ("IF a>0 sub3 a-1;", "a:=a;"),
+    "an override": ("VelSet 50,5000;", "VelSet 60,5000;"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FURTHER_MISREADINGS)
+def test_a_misreading_of_further_forms_is_found(name: str) -> None:
+    old, new = FURTHER_MISREADINGS[name]
+    assert any(judged_further(seed, lambda text: text.replace(old, new))[1] for seed in range(400))

@@ -9,7 +9,7 @@ import pytest
 from case_files import TP_CASES
 from tp_judge.claims import disagreements
 from tp_judge.machine import TpMachine
-from tp_judge.programs import TpWriter
+from tp_judge.programs import FurtherTpWriter, TpWriter
 
 from postproc.base.document import Document
 from postproc.languages import DIALECTS
@@ -22,10 +22,10 @@ def read(text: str) -> Program:
     return DIALECTS["tp"].read((Document(Path("part.ls"), text.encode()),))
 
 
-def judged(seed: int, shown=lambda text: text) -> tuple[Program, list[str], int]:
+def judged(seed: int, shown=lambda text: text, writer=TpWriter) -> tuple[Program, list[str], int]:
     """The program of a seed as the reader sees it ``shown``, what its executions say against it, and how many motions
     they had."""
-    text = TpWriter(np.random.default_rng(seed)).program()
+    text = writer(np.random.default_rng(seed)).program()
     program = read(shown(text))
     wrong, count = [], 0
     for run in range(RUNS):
@@ -35,11 +35,11 @@ def judged(seed: int, shown=lambda text: text) -> tuple[Program, list[str], int]
     return program, wrong, count
 
 
-def held(seeds: range) -> tuple[int, int, int]:
+def held(seeds: range, writer=TpWriter) -> tuple[int, int, int]:
     """Motions, those of them that the reader claims to know, and motions that were executed."""
     motions = known = executed = 0
     for seed in seeds:
-        program, wrong, count = judged(seed)
+        program, wrong, count = judged(seed, writer=writer)
         assert not wrong, (seed, wrong[:3])
         motions += len(program.toolpath)
         known += len(program.toolpath) - len(program.toolpath.constraints.refused)
@@ -58,6 +58,19 @@ def test_every_claim_holds_in_every_execution_of_many_programs() -> None:
     motions, known, _ = held(range(1000, 2000))
     assert motions > 5000
     assert known > 0.4 * motions
+
+
+def test_every_claim_of_further_options_holds() -> None:
+    motions, known, executed = held(range(3000, 3040), FurtherTpWriter)
+    assert known > 0.3 * motions
+    assert executed > motions
+
+
+@pytest.mark.slow
+def test_every_claim_of_further_options_holds_in_many_programs() -> None:
+    motions, known, _ = held(range(4000, 4600), FurtherTpWriter)
+    assert motions > 3000
+    assert known > 0.3 * motions
 
 
 BEYOND = [
@@ -113,3 +126,29 @@ MISREADINGS = {
 def test_a_misreading_is_found(name: str) -> None:
     old, new = MISREADINGS[name]
     assert any(judged(seed, lambda text: text.replace(old, new))[1] for seed in range(120))
+
+
+FURTHER_MISREADINGS = {
+    "a program beside a motion": (
+        ("TB .20sec,CALL OTHER", "TA .20sec,CALL OTHER(1)", "DB 3.0mm,CALL OTHER"),
+        "",
+    ),
+    "an increment": ((" INC",), ""),
+    "a skip": (("Skip,LBL",), "ACC50 ;!"),
+    "a coordinated motion": ((" COORD",), ""),
+    "a second group": (("   GP2:\n\tUF : 1, UT : 1,\n\tJ1= 5.000 deg\n",), ""),
+    "a name in brackets": (("P[3:corner]",), "P[4]"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FURTHER_MISREADINGS)
+def test_a_misreading_of_further_options_is_found(name: str) -> None:
+    old, new = FURTHER_MISREADINGS[name]
+
+    def shown(text: str) -> str:
+        for words in old:
+            text = text.replace(words, new)
+        return text
+
+    assert any(judged(seed, shown, FurtherTpWriter)[1] for seed in range(200))

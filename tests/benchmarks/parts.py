@@ -115,6 +115,29 @@ def rapid(folder: Path, count: int) -> Path:
     return folder / "big.mod"
 
 
+def rapid_named(folder: Path, count: int) -> Path:
+    """Each target is declared by a name."""
+    points = path(count)
+    x, y, _ = points[0].tolist()
+
+    def declared(name: str, x: float, y: float, z: float) -> str:
+        target = f"[[{x:.3f},{y:.3f},{z:.3f}],[0,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+        return f"CONST robtarget {name}:={target};\r\n"
+
+    with open(folder / "big.mod", "w", newline="") as stream:
+        stream.write("MODULE big\r\n" + declared("pAbove", x, y, 50.0))
+        for start in range(0, count, BLOCK):
+            part = enumerate(points[start : start + BLOCK].tolist(), start)
+            stream.writelines(declared(f"p{number}", *place) for number, place in part)
+        stream.write("PROC main()\r\nConfL \\Off;\r\nMoveJ pAbove,v50,z1,tMill\\WObj:=wPart;\r\n")
+        stream.writelines(f"MoveL p{number},v50,z1,tMill\\WObj:=wPart;\r\n" for number in range(count))
+        stream.write("ENDPROC\r\nENDMODULE\r\n")
+    with open(folder / "cell.yaml", "a") as stream:
+        stream.write("symbols: {TMILL: 1, WPART: 1}\n")
+    forces(folder, np.arange(count) + count + 6)
+    return folder / "big.mod"
+
+
 def tp(folder: Path, count: int) -> Path:
     points = path(count)
     head = ["/PROG BIG", "/MN", "   1:  UFRAME_NUM=1 ;", "   2:  UTOOL_NUM=1 ;", "   3:J P[1] 5% FINE    ;"]
@@ -137,7 +160,7 @@ def tp(folder: Path, count: int) -> Path:
     return folder / "big.ls"
 
 
-MAKERS: dict[str, Maker] = {"krl": krl, "gcode": gcode, "rapid": rapid, "tp": tp}
+MAKERS: dict[str, Maker] = {"krl": krl, "gcode": gcode, "rapid": rapid, "rapid_named": rapid_named, "tp": tp}
 
 
 def program(folder: Path, language: str, count: int) -> Path:

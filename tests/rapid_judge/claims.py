@@ -17,7 +17,9 @@ NEAR = 1e-3
 
 def disagreements(program: Program, done: list[Done]) -> list[str]:
     """What does not agree, in words."""
-    return judged_motions.disagreements(program, done, "RAP009", _motion)
+    return judged_motions.disagreements(
+        program, done, "RAP009", _motion, lambda motion: -2 if motion.elsewhere else None
+    )
 
 
 def _motion(program: Program, row: int, motion: Done, _: int) -> list[str]:
@@ -25,6 +27,8 @@ def _motion(program: Program, row: int, motion: Done, _: int) -> list[str]:
     wrong = []
     if motion.displaced:
         wrong.append("it is displaced")
+    if motion.word == "moveextj":
+        return [*wrong, "it moves external axes alone"]
     if motion.word == "moveabsj":
         if not np.allclose(np.degrees(path.axes[row]), motion.target[0], atol=NEAR):
             wrong.append("other axes")

@@ -29,7 +29,14 @@ PART = {
     "trans": "pos", "rot": "orient", "tframe": "pose", "uframe": "pose", "oframe": "pose", "at": "robtarget",
 }  # fmt: skip
 FIRST = frozenset((";", ":", "then", "do", "else"))
-CLOSED = frozenset(("endif", "endwhile", "endfor", "endtest", "endproc", "endfunc", "endtrap", "error"))
+HANDLERS = frozenset(("error", "backward", "undo"))
+CLOSED = frozenset(("endif", "endwhile", "endfor", "endtest", "endproc", "endfunc", "endtrap")) | HANDLERS
+PROCESSES = frozenset(("triggl", "triggj", "triggc", "arclstart", "arcl", "arclend", "arcc"))
+"""Motions whose zone and tool are their last arguments."""
+MOTIONS = PROCESSES | {
+    "movel", "movej", "movec", "moveldo", "movejdo", "movelsync", "moveabsj", "moveextj",
+}  # fmt: skip
+STANDS = re.compile(r"inpos\d+|stoptime\w+")
 
 
 class Halt(Exception):
@@ -57,7 +64,7 @@ class Ref:
 
 @dataclass
 class Done:
-    """A motion that was executed."""
+    """A motion that was executed; ``aside``: by a trap or an error handler; ``elsewhere``: after one of these."""
 
     line: int
     word: str
@@ -70,6 +77,8 @@ class Done:
     force: str | None
     displaced: bool
     wrist: bool = False
+    aside: bool = False
+    elsewhere: bool = False
 
 
 class Machine:
@@ -77,8 +86,9 @@ class Machine:
 
     def __init__(self, text: str, random, most: int = 400, rounds: bool = False, loose: bool = False) -> None:
         self.rounds, self.loose = rounds, loose
-        self.armed = False
-        self.depth = 0
+        self.armed = self.concurrent = self.strayed = False
+        self.depth = self.aside = 0
+        self.pending: list[str] = []
         self.tokens = []
         for number, line in enumerate(text.split("\n"), 1):
             at, own = 0, []
@@ -93,7 +103,8 @@ class Machine:
         self.random, self.left = random, most
         self.done: list[Done] = []
         self.force = None
-        self.displaced = self.wrist = False
+        self.displaced: frozenset[str] = frozenset()
+        self.wrist = False
         self.override = 1.0
         self.kinds: dict[str, str] = {}
         self.world: dict[str, Ref] = {}
@@ -126,10 +137,16 @@ class Machine:
                 parameters = []
                 while self.tokens[i][1] != ")":
                     mode = ""
+                    optional = self.tokens[i][1] == "\\"
+                    i += optional
+                    if self.tokens[i][1] == "switch":
+                        parameters.append(("", "switch", self.tokens[i + 1][1], True))
+                        i += 2 + (self.tokens[i + 2][1] == ",")
+                        continue
                     if self.tokens[i][1] in ("inout", "pers", "var"):
                         mode = "inout"
                         i += 1
-                    parameters.append((mode, self.tokens[i][1], self.tokens[i + 1][1]))
+                    parameters.append((mode, self.tokens[i][1], self.tokens[i + 1][1], optional))
                     i += 2
                     if self.tokens[i][1] == ",":
                         i += 1
@@ -184,7 +201,7 @@ class Machine:
             found.append(self.done)
             if not ended:
                 self._module(("var",))
-                self.displaced, self.override, self.wrist, self.armed = False, 1.0, False, False
+                self.displaced, self.override, self.wrist, self.armed = frozenset(), 1.0, False, False
         return found
 
     def _call(self, name: str, own: dict, kinds: dict) -> object:
@@ -195,27 +212,39 @@ class Machine:
         saved = self.own, self.own_kinds
         self.own, self.own_kinds = own, kinds
         stop = self._end(start)
-        handler = next((i for i in range(start, stop) if self.tokens[i][1] == "error"), stop)
+        parts = [i for i in range(start, stop) if self.tokens[i][1] in HANDLERS]
+        first = parts[0] if parts else stop
+        handler = next((i for i in parts if self.tokens[i][1] == "error"), stop)
+        after = next((i for i in parts if i > handler), stop)
         labels = {
             self.tokens[i][1]: i + 2
-            for i in range(start, handler)
+            for i in range(start, first)
             if self.tokens[i + 1][1] == ":" and self.tokens[i][0] == "name" and self._starts(i)
         }
         self.depth += 1
         try:
-            return self._body(start, handler, labels, None if handler == stop else (handler + 1, stop))
+            return self._body(start, first, labels, None if handler == stop else (handler + 1, after))
         finally:
             self.own, self.own_kinds = saved
             self.depth -= 1
 
     def _interrupt(self) -> None:
-        """A trap runs between two statements."""
+        """A trap runs between two statements, or a routine that a motion calls."""
+        if self.pending and not self.aside and self.random.random() < 0.5:
+            self._aside(self.pending.pop(0))
         if not self.armed or self.random.random() > 0.08:
             return
         self.armed = False
         for name in self.traps:
-            self._call(name, {}, {})
+            self._aside(name)
         self.armed = True
+
+    def _aside(self, name: str) -> None:
+        self.aside += 1
+        try:
+            self._call(name, {}, {})
+        finally:
+            self.aside -= 1
 
     def _starts(self, i: int) -> bool:
         return self.tokens[i - 1][1] in FIRST | CLOSED | {")"} or self.tokens[i - 1][0] == "remark"
@@ -307,11 +336,14 @@ class Machine:
                 except Fault:
                     if handler is None:
                         raise
+                    self.aside += 1
                     try:
                         self._body(*handler, {})
                         return None
                     except Left as how:
                         i = i if how.args[0] == "retry" else self._semicolon(i)
+                    finally:
+                        self.aside -= 1
         return None
 
     def _jump(self, i: int, to: int, stack: list[tuple]) -> int:
@@ -391,19 +423,20 @@ class Machine:
         if following in (":=", "{", "."):
             return self._assign(i)
         required, options, j = self._arguments(i + 1)
-        if word in ("movel", "movej", "movec", "moveldo", "moveabsj"):
+        if word in MOTIONS:
             self._move(word, line, required, options)
         elif word == "waittime" and self.done and (required[0][0] >= 0.2 or "inpos" in options):
-            self.done[-1] = replace(self.done[-1], zone=0.0)  # too late to be planned ahead
+            if "inpos" in options or not self.concurrent or self.random.random() < 0.5:
+                self.done[-1] = replace(self.done[-1], zone=0.0)  # too late to be planned ahead
         elif word == "waitdi":
             if "maxtime" in options and self.random.random() < 0.3:
                 raise Fault
         elif word == "isignaldi":
             self.armed = True
-        elif word == "pdispset":
-            self.displaced = True
-        elif word == "pdispoff":
-            self.displaced = False
+        elif word in ("pdispset", "eoffsset", "softact"):
+            self.displaced |= {word[:4]}
+        elif word in ("pdispoff", "eoffsoff", "softdeact"):
+            self.displaced -= {word[:4]}
         elif word == "velset":
             self.override = required[0][0] / 100
         elif word == "speedrefresh":
@@ -418,16 +451,20 @@ class Machine:
         elif word == "callbyvar":
             self._call(f"{required[0][0]}{int(required[1][0])}", {}, {})
         elif word in self.routines:
-            self._start(word, required)
+            self._start(word, required, options)
         return j
 
     def _variable(self, name: str) -> Ref:
         return self.own[name] if name in self.own else self.world[name]
 
-    def _start(self, word: str, required: list) -> object:
+    def _start(self, word: str, required: list, options: dict) -> object:
         """Calls a routine with arguments, of which some are the caller's own variables."""
         own, kinds = {}, {}
-        for (mode, kind, name), (value, texts) in zip(self.routines[word][1], required, strict=True):
+        parameters = self.routines[word][1]
+        given = [(one, options[one[2]]) for one in parameters if one[3] and one[2] in options]
+        given += zip((one for one in parameters if not one[3]), required, strict=True)
+        for (mode, kind, name, _), argument in given:
+            value, texts = argument if isinstance(argument, tuple) else (argument, [])
             own[name] = self._variable(texts[0][1]) if mode else Ref(_copied(value))
             kinds[name] = kind
         return self._call(word, own, kinds)
@@ -458,9 +495,13 @@ class Machine:
 
     def _move(self, word: str, line: int, required: list, options: dict) -> None:
         via = None
-        if word == "movec":
+        if word in ("movec", "triggc", "arcc"):
             via = required.pop(0)[0]
-        target, speed, zone, tool = required[:4]
+        target, speed, *_ = required
+        if word == "moveextj":
+            zone, tool = required[2], ("tool0", [(None, "tool0")])
+        else:
+            zone, tool = required[-2:] if word in PROCESSES else required[2:4]
 
         def named(one):
             return one[1][0][1] if isinstance(one[0], Input) or one[0] is None else one[0]
@@ -472,6 +513,13 @@ class Machine:
         size = None
         if isinstance(zone[0], list):
             size = 0.0 if zone[0][0] is True else options["z"][0] if "z" in options else zone[0][1]
+        if "inpos" in options:
+            size = 0.0 if STANDS.fullmatch(options["inpos"][1][0][1]) else None
+        self.concurrent = "conc" in options
+        if word == "movelsync":
+            self.pending.append(required[-1][0].lower())
+        if self.aside:
+            self.strayed = True
         wobj = named(options["wobj"]) if "wobj" in options else "wobj0"
         self.done.append(
             Done(
@@ -484,10 +532,13 @@ class Machine:
                 named(tool),
                 wobj,
                 self.force,
-                self.displaced,
+                bool(self.displaced),
                 self.wrist,
+                self.aside > 0,
+                self.strayed and not self.aside,
             )
         )
+        self.strayed = self.strayed and self.aside > 0
 
     def _assign(self, i: int) -> int:
         name = self.tokens[i][1]
@@ -604,8 +655,10 @@ class Machine:
             value, i = self._compare(i + 1, scopes)
             return not value, i
         if word in self.routines and self.tokens[i + 1][1] == "(":
-            required, _, i = self._arguments(i + 2)
-            return self._start(word, required), i
+            required, options, i = self._arguments(i + 2)
+            return self._start(word, required, options), i
+        if word == "present":
+            return self.tokens[i + 2][1] in self.own, i + 4
         if word in ("offs", "reltool"):
             return self._displaced(word, i + 2, scopes)
         if word in ("true", "false"):

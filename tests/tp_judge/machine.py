@@ -5,7 +5,11 @@ Written from the description of the language; shares no code with the package.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+
+ODD = re.compile(r"Offset|Tool_Offset|INC|Skip|COORD|RTCP", re.I)
+"""Options after which a motion does not end at its point, or not alone."""
 
 
 class Halt(Exception):
@@ -38,6 +42,7 @@ class TpMachine:
         self.selected = {"UFRAME_NUM": int(random.integers(1, 3)), "UTOOL_NUM": int(random.integers(1, 3))}
         self.force: str | None = None
         self.weaves = self.called = False
+        self.later = 0  # programs that motions call beside their path, and that still run
         self.override = 1.0
         self.program: list[tuple[int, str]] = []
         self.points: dict[int, dict[str, object]] = {}
@@ -47,6 +52,7 @@ class TpMachine:
         main, points = lines.index("/MN"), lines.index("/POS")
         for number, line in enumerate(lines[main + 1 : points], main + 2):
             label, _, rest = line.partition(":")
+            rest = re.sub(r"\[(\w+):[^\]]*\]", r"[\1]", rest)  # a name in brackets says nothing
             if label.strip():
                 self.program.append((number, rest))
             else:
@@ -58,13 +64,16 @@ class TpMachine:
             if not brace:
                 continue
             values: dict[str, object] = {}
+            data, second, _ = data.partition("GP2:")
+            if second:
+                values["GP2"] = 1.0
             for item in data.replace("GP1:", "").replace("\n", " ").split(","):
                 word, _, value = item.replace("=", ":").partition(":")
                 if word.strip() in ("UF", "UT"):
                     values[word.strip()] = int(value)
                 elif value.split() and value.split()[0].lstrip("-").replace(".", "").isdigit():
                     values[word.strip()] = float(value.split()[0])
-            self.points[int(head.strip()[2:-1])] = values
+            self.points[int(head.strip()[2:-1].partition(":")[0])] = values
 
     def run(self) -> list[DoneMotion]:
         at, loops = 0, {}
@@ -80,12 +89,17 @@ class TpMachine:
 
     def _statement(self, at: int, loops: dict[int, float]) -> int:
         line, text = self.program[at]
+        if self.later and self.random.random() < 0.5:
+            self.later -= 1
+            self.registers = {}
         if text.startswith(("!", "//")):
             said = text.lstrip("!/").strip()
             if said.startswith("FORCE"):
                 self.force = said
         elif text[:2] in ("J ", "L ", "C ", "A "):
             self._motion(line, text)
+            if "Skip" in text and self.random.random() < 0.5:
+                return self._action(at, "JMP " + text[text.index("LBL[") :].partition(" ")[0])
         elif text.startswith("IF ") and text.endswith("THEN"):
             if not self._holds(text[3:-4]):
                 return self._matching(at, ("IF", "ENDIF"), "ELSE")
@@ -229,10 +243,15 @@ class TpMachine:
                 line, form, [points[-1][key] for key in keys],
                 [points[0][key] for key in keys] if form == "C" else None, joint, frames, self._speed(rest[0]),
                 0.0 if corner == "FINE" else float(corner[2:]) if corner.startswith("CR") else None,
-                corner == "FINE", self.force, self.weaves or any("Offset" in word for word in rest), self.called,
+                corner == "FINE", self.force, self._is_elsewhere(rest) or "GP2" in points[-1], self.called,
             )
         )  # fmt: skip
-        self.called = self.done[-1].displaced  # where it ends is not in the text
+        self.later += any("CALL" in word for word in rest)
+        self.called = self._is_elsewhere(rest)
+
+    def _is_elsewhere(self, options: list[str]) -> bool:
+        """Whether a motion ends where the text does not say."""
+        return self.weaves or any(ODD.match(word) for word in options)
 
     def _speed(self, word: str) -> float | None:
         for unit, factor in (("mm/sec", 1.0), ("cm/min", 10 / 60), ("inch/min", 25.4 / 60)):

@@ -132,3 +132,44 @@ class TpWriter:
             return
         self.lines.append(f"  SELECT R[9]=1,JMP LBL[{self._label()}]")
         self.lines.append(f"         =2,{self._pick('CALL OTHER', f'JMP LBL[{self._label()}]')}")
+
+
+class FurtherTpWriter(TpWriter):
+    """Motions with what else TP has: programs that they call beside their path, increments, skips, two groups."""
+
+    def program(self) -> str:
+        self.calls = self.random.random() < 0.3
+        return super().program()
+
+    def _point(self, n: int) -> str:
+        text = super()._point(n).replace("P[", f"P[{n}:name" + "]{", 1).replace("]{" + f"{n}]", "]")
+        if n == 8:
+            text = text.replace("\n};", "\n   GP2:\n\tUF : 1, UT : 1,\n\tJ1= 5.000 deg\n};")
+        return text
+
+    def _motion(self) -> None:
+        before = len(self.lines)
+        super()._motion()
+        line = self.lines[before]
+        if line.startswith(("L", "C")) and "Offset" not in line and self.random.random() < 0.5:
+            options = [
+                " INC", " Tool_Offset,PR[2]", " TA .10sec,DO[1]=ON", " DB 5.0mm,DO[2]=OFF", " Wjnt", " COORD", " RTCP",
+                " PTH", f" Skip,LBL[{self._label()}]" if self.depth == 0 else " ACC50",
+            ]  # fmt: skip
+            if self.calls:
+                options += [" TB .20sec,CALL OTHER", " TA .20sec,CALL OTHER(1)", " DB 3.0mm,CALL OTHER"] * 2
+            self.lines[before] = line + self._pick(*options)
+        if self.random.random() < 0.3:
+            self.lines[before] = self.lines[before].replace("P[3]", "P[3:corner]").replace("P[4]", "P[4:a b]")
+
+    def _setting(self) -> None:
+        if self.random.random() < 0.7:
+            super()._setting()
+        else:
+            self.lines.append(
+                "  " + self._pick("PAYLOAD[1]", "UFRAME_NUM[GP2]=2", "R[1:speed]=33", "LBL[77:end]")
+                if 77 not in self.labels and self.depth == 0
+                else "  R[2]=44"
+            )
+            if self.lines[-1].endswith("LBL[77:end]"):
+                self.labels.append(77)

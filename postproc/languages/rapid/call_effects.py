@@ -7,13 +7,15 @@ from itertools import chain
 from typing import NamedTuple
 
 from postproc.languages.core.row_facts import SPEAKS
+from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.declared_data import Usage, walk
-from postproc.languages.rapid.instructions import DISPLACING, MODES
+from postproc.languages.rapid.instructions import DISPLACING, HALTING, MODES, WAITING
 from postproc.languages.rapid.program_state import VARYING, ProgramState
 from postproc.languages.rapid.syntax_tree import (
     Expression,
     FunctionCall,
     Instruction,
+    Leave,
     Name,
     NotUnderstood,
     NumberLiteral,
@@ -79,10 +81,12 @@ def _calls(expression: Expression) -> list[FunctionCall]:
 
 
 class ModeChanges(NamedTuple):
-    """The instructions of routines that change how motions are meant, and whether comments on forces are in them."""
+    """The instructions of routines that change how motions are meant, and whether comments on forces, and instructions
+    at which the program waits, are in them."""
 
     names: Set[bytes]
     speaks: bool
+    waits: bool
 
     def __bool__(self) -> bool:
         return bool(self.names) or self.speaks
@@ -102,8 +106,15 @@ class ModeChanges(NamedTuple):
             state.checks_linear = None
         if b"CONFJ" in names:
             state.checks_joint = None
+        if self.waits:
+            state.waits = max(state.waits, Waits.MAYBE)
         if self.speaks:
             state.force = state.switch = VARYING
+
+
+def leaving_words(body: tuple[Statement, ...]) -> set[bytes]:
+    """RETURN and other words that leave statements, or start them again."""
+    return {one.word for one in walk(body) if isinstance(one, Leave)}
 
 
 def mode_changes(bodies: Iterable[tuple[Statement, ...]]) -> ModeChanges:
@@ -117,4 +128,4 @@ def mode_changes(bodies: Iterable[tuple[Statement, ...]]) -> ModeChanges:
             names |= one.names
         elif isinstance(one, Remark):
             speaks = speaks or SPEAKS.match(one.text) is not None
-    return ModeChanges(names & MODES, speaks)
+    return ModeChanges(names & MODES, speaks, not names.isdisjoint(HALTING | WAITING | {b"WAITTIME"}))

@@ -66,6 +66,19 @@ ZONES: Mapping[bytes, float] = MappingProxyType(
 )
 """Name -> pzone_tcp [mm]; 0 for a stop point."""
 
+STOP_KINDS: Mapping[bytes, float] = MappingProxyType({b"INPOS": 1.0, b"STOPTIME": 2.0, b"FOLLOWTIME": 3.0})
+"""Name -> what a stop point waits for, the first component of stoppointdata."""
+
+_TIMES = (b"0_5", b"1_0", b"1_5")
+STOP_POINTS: Mapping[bytes, float] = MappingProxyType(
+    {
+        **{b"INPOS%d" % percent: STOP_KINDS[b"INPOS"] for percent in (20, 50, 100)},
+        **{b"STOPTIME" + time: STOP_KINDS[b"STOPTIME"] for time in _TIMES},
+        **{b"FLLWTIME" + time: STOP_KINDS[b"FOLLOWTIME"] for time in _TIMES},
+    }
+)
+"""Name of stoppointdata -> what it waits for."""
+
 FLY_BY = b"z0"
 """The smallest zone in which the robot does not stop."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from postproc.languages.rapid.data_types import RECORDS, SPEEDS, ZONES, Components
+from postproc.languages.rapid.data_types import RECORDS, SPEEDS, STOP_KINDS, STOP_POINTS, ZONES, Components
 from postproc.languages.rapid.evaluation import Evaluator, Typed
 from postproc.languages.rapid.instructions import (
     ANY_PROCEDURE,
@@ -27,11 +27,13 @@ from postproc.languages.rapid.syntax_tree import (
     FunctionCall,
     Index,
     Instruction,
+    Label,
     Module,
     Name,
     NotUnderstood,
     PlainMotions,
     RapidRoutine,
+    Statement,
     StringLiteral,
 )
 from postproc.languages.rapid.values import FALSE, TRUE, GroupValue, Leaf, UnknownData, Value, number_of
@@ -46,6 +48,10 @@ def _predefined() -> dict[bytes, Typed]:
         found[name] = (GroupValue((Leaf(speed),)), b"")
     for name, zone in ZONES.items():
         found[name] = (GroupValue((TRUE if name == b"FINE" else FALSE, Leaf(zone))), b"")
+    for name, kind in STOP_POINTS.items():
+        found[name] = (GroupValue((Leaf(kind),)), b"")
+    for name, kind in STOP_KINDS.items():
+        found[name] = (Leaf(kind), b"NUM")
     return found
 
 
@@ -146,7 +152,8 @@ class Usage:
     """Names in the routines: ``assigned`` anywhere, ``later``: not shown by the flow, ``read``: otherwise than
     as the point of a motion; ``calls``, ``assigned_in``, ``mentioned_in``: routine -> what it may call, assigns, and
     has in it; ``moves``: routines in which the robot may move; ``set_by_name``: data is set that a string names;
-    ``aside``: routines that traps and error handlers run."""
+    ``aside``: routines that traps, error handlers and synchronous calls of motions (MoveLSync) run; ``strays``: one of
+    these may move the robot, and does not keep the path (StorePath)."""
 
     def __init__(self, module: Module) -> None:
         self.assigned: set[bytes] = set()
@@ -167,11 +174,19 @@ class Usage:
             self._expressions(one.value, one.extent)
         for unread_statements in module.unread_statements:
             self.read |= unread_statements.names
+        self._synchronous: set[bytes] = set()
         aside = [routine.name for routine in module.routines if routine.kind == b"TRAP"]
+        handlers_move = False
         for routine in module.routines:
             self._called, self._set, self._mentioned = set(), set(), set()
-            for statement in walk(routine.handlers):
+            errors, others = _of_errors(routine.handlers)
+            for statement in walk(others):
                 self._statement(statement, routine)
+            self.moves.discard(routine.name)
+            self._called = set()
+            for statement in walk(errors):
+                self._statement(statement, routine)
+            handlers_move |= routine.name in self.moves and b"STOREPATH" not in self._called
             self.later |= self._set
             aside += self._called
             for statement in walk(routine.body):
@@ -180,9 +195,11 @@ class Usage:
             self.assigned_in.setdefault(routine.name, set()).update(self._set)
             self.mentioned_in.setdefault(routine.name, set()).update(self._mentioned)
             self.assigned |= self._set
-        self.aside = self.reached(aside)
+        self.aside = self.reached([*aside, *self._synchronous])
         for name in self.aside:
             self.later |= self.assigned_in.get(name, set())
+        moving = (name for name in self.aside & self.moves if b"STOREPATH" not in self.calls.get(name, ()))
+        self.strays = handlers_move or any(moving)
 
     def reached(self, names: Iterable[bytes]) -> set[bytes]:
         """What calls of routines may run: these, and what they call."""
@@ -192,8 +209,13 @@ class Usage:
             one = pending.pop()
             if one not in seen:
                 seen.add(one)
-                pending += self._own if one.startswith(ANY_PROCEDURE) else self.calls.get(one, ())
+                pending += self._own if self.is_late(one) else self.calls.get(one, ())
         return seen
+
+    @staticmethod
+    def is_late(name: bytes) -> bool:
+        """Whether a call is one whose procedure a string names."""
+        return name.startswith(ANY_PROCEDURE)
 
     def _statement(self, statement: Any, routine: RapidRoutine) -> None:
         match statement:
@@ -232,6 +254,8 @@ class Usage:
         points = () if sorted_arguments is None else sorted_arguments.points
         if is_motion(statement.name):
             self.moves.add(routine.name)
+            if form is not None and form.calls:
+                self._synchronous.add(self.synchronous_call(statement))
         elif statement.name in SETS_BY_NAME:
             self._set_by_name(statement)
         elif statement.name not in HARMLESS or statement.name in WRITERS or statement.name in self._own:
@@ -249,6 +273,12 @@ class Usage:
                 self._mentioned |= names_in((argument,))
             else:
                 self._expressions(argument.value)
+
+    @staticmethod
+    def synchronous_call(statement: Instruction) -> bytes:
+        """The routine that a motion calls at its end, which its last argument names."""
+        name = statement.arguments[-1].value if statement.arguments else None
+        return name.value.upper() if isinstance(name, StringLiteral) else ANY_PROCEDURE[0]
 
     def _set_by_name(self, statement: Instruction) -> None:
         name = statement.arguments[0].value if statement.arguments else None
@@ -271,6 +301,17 @@ class Usage:
                 pending += one.arguments
             elif isinstance(one, tuple):
                 pending += one
+
+
+def _of_errors(handlers: tuple[Statement, ...]) -> tuple[tuple[Statement, ...], tuple[Statement, ...]]:
+    """The statements of ERROR, and those of BACKWARD and UNDO, after which the program does not go on."""
+    parts: tuple[list[Statement], list[Statement]] = [], []
+    is_other = False
+    for one in handlers:
+        if isinstance(one, Label) and one.name in (b"ERROR", b"BACKWARD", b"UNDO"):
+            is_other = one.name != b"ERROR"
+        parts[is_other].append(one)
+    return tuple(parts[0]), tuple(parts[1])
 
 
 def _conditions(statement: Any) -> Iterator[Any]:

@@ -16,7 +16,8 @@ class MotionForm:
     """Which required arguments a motion has: points first (the last one is the target), then the speed, ``extra`` of
     a process, zone and tool, ``after`` of a signal.
 
-    ``starts_process``: nothing can be inserted before it; ``feed``: the speed is that of its speeddata.
+    ``starts_process``: nothing can be inserted before it; ``feed``: the speed is that of its speeddata; ``calls``: its
+    last argument names a routine that is run while the robot moves.
     """
 
     kind: Kind
@@ -26,6 +27,7 @@ class MotionForm:
     options: frozenset[bytes] = frozenset()
     starts_process: bool = False
     feed: bool = True
+    calls: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +53,7 @@ def _forms() -> dict[bytes, MotionForm]:
         forms[b"MOVE" + letter] = MotionForm(kind, points, options=_COMMON)
         for signal in (b"DO", b"AO", b"GO"):
             forms[b"MOVE" + letter + signal] = MotionForm(kind, points, after=2, options=_COMMON)
-        forms[b"MOVE" + letter + b"SYNC"] = MotionForm(kind, points, after=1, options=_COMMON)
+        forms[b"MOVE" + letter + b"SYNC"] = MotionForm(kind, points, after=1, options=_COMMON, calls=True)
         forms[b"TRIGG" + letter] = MotionForm(kind, points, (1,), options=_TRIGGERS, starts_process=True)
         for part in (b"", b"START", b"END") if kind != Kind.PTP else ():
             forms[b"ARC" + letter + part] = MotionForm(
@@ -97,7 +99,8 @@ HARMLESS = WRITERS | frozenset(
     b" TRIGGCHECKIO TRIGGSPEED TRIGGRAMPAO LOAD STARTLOAD WAITLOAD UNLOAD ERASEMODULE SAVE LOGEVENT SETSYSDATA"
     b" SOCKETCREATE SOCKETCLOSE SOCKETCONNECT SOCKETSEND SOCKETBIND SOCKETLISTEN SOCKETACCEPT TUNESERVO"
     b" TUNERESET UISHOW WZFREE WZENABLE WZDISABLE WZDOSET WZLIMSUP WZBOXDEF WZCYLDEF WZSPHDEF CORRDISCON"
-    b" SETALLDATAVAL SETDATASEARCH SETDATAVAL SYNCMOVESUSPEND WAITSYNCTASK CONNECT".split()
+    b" SETALLDATAVAL SETDATASEARCH SETDATAVAL SYNCMOVESUSPEND WAITSYNCTASK CONNECT"
+    b" RESETRETRYCOUNT SKIPWARN".split()
 ) - {b"SETDATAVAL", b"SETALLDATAVAL", b"SYNCMOVESUSPEND", b"STORE"}
 """Instructions that move nothing and change no data but that of ``WRITERS``."""
 

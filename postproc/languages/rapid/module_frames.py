@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from difflib import get_close_matches
 
 import numpy as np
 
@@ -38,7 +39,7 @@ class ModuleFrames:
             return "RAP013", "its tool is fixed in the cell (robhold is FALSE)"
         pose = _pose(item_of(use.value, 1))
         if held is None or pose is None:
-            return "RAP005", f"its tool is not known: {_reason(use)}"
+            return "RAP005", f"its tool is not known: {self._reason(use)}"
         return self._posed("tool", pose, self._lines.get(use.name, line))
 
     def base(self, use: FrameUse, line: int) -> int | Problem:
@@ -56,7 +57,7 @@ class ModuleFrames:
             return "RAP011", "its work object moves with a mechanical unit"
         user, within = (_pose(item_of(use.value, at)) for at in (3, 4))
         if held is None or fixed is None or not isinstance(unit, Leaf) or user is None or within is None:
-            return "RAP005", f"its work object is not known: {_reason(use)}"
+            return "RAP005", f"its work object is not known: {self._reason(use)}"
         return self._posed("base", user @ within, self._lines.get(use.name, line))
 
     def _bound(self, kind: str, use: FrameUse, line: int) -> int | Problem | None:
@@ -75,6 +76,14 @@ class ModuleFrames:
             return "RAP005", f"the cell does not state X, Y, Z, A, B, C of {_shown(use)}"
         values = np.array([symbol[key] for key in _KEYS])
         return self._posed(kind, Poses.from_abc(values[:3] * MM, values[3:] * DEG), 0)
+
+    def _reason(self, use: FrameUse) -> str:
+        """Why a frame is not known, with the name in the cell that may have been meant."""
+        reason = reason_of(use.value, "its declaration is not understood")
+        if use.name and use.name not in self._lines:
+            close = get_close_matches(use.name.decode("latin-1"), self._symbols, 1)
+            return reason + "".join(f"; the cell has the symbol {name}" for name in close)
+        return reason
 
     def _posed(self, kind: str, pose: Poses, line: int) -> int:
         key = (kind, *pose.position.tolist(), *pose.rotation.ravel().tolist())
@@ -96,10 +105,6 @@ def _pose(value: Value) -> Poses | None:
     if np.isnan(rotation).any():
         return None
     return Poses(rotation, np.array(position) * MM)
-
-
-def _reason(use: FrameUse) -> str:
-    return reason_of(use.value, "its declaration is not understood")
 
 
 def _shown(use: FrameUse) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from codecs import BOM_UTF8
 from functools import partial
 
+import numpy as np
+
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
 from postproc.base.memory import without_garbage_collection
@@ -20,6 +22,7 @@ SYNTAX = EditSyntax(comment=b"!", numbers_after=b"[,")
 
 
 @without_garbage_collection()
+@np.errstate(over="ignore", invalid="ignore")  # numbers that no robot has are refused, of whatever size they are
 def read(documents: tuple[Document, ...], settings: ReadingSettings, fast: bool = True) -> Program:
     """The program of a file; never raises on its content.
 
@@ -82,16 +85,19 @@ def _structure(document: Document, module: Module, flow: Propagation) -> list[Fi
 
 
 def _calls(document: Document, flow: Propagation) -> list[Finding]:
-    """Calls of what the file does not contain, once each."""
+    """Calls of what the file does not contain, and others that are not followed, once each."""
     return [
-        _finding(
-            document,
-            "RAP010",
-            f"{name.decode('latin-1')[:40]} is not in this file: it may move the robot",
-            at,
-        )
+        _finding(document, "RAP010", f"{name.decode('latin-1')[:40]} {_why_unread(name, flow)}", at)
         for name, at in flow.calls.items()
     ]
+
+
+def _why_unread(name: bytes, flow: Propagation) -> str:
+    if flow.usage.is_late(name):
+        return "names the procedure by a text: it may move the robot"
+    if name in flow.routines:
+        return "calls itself, is called too deep, or is not understood: not each of its runs is followed"
+    return "is not in this file: it may move the robot"
 
 
 def _finding(document: Document, code: str, message: str, at: int) -> Finding:

@@ -45,8 +45,8 @@ class ModuleRows:
 
     first (M + 1,): row of the first motion of each fact; fact_of (N,).  starts (N,): offsets of the statements; lines
     (N,): their numbers.  base, tool (N,): indices of frames, -1 where not known; quadrants, cfx (N,): -1 likewise.
-    never_from: the first row of those that never run.  problems: row -> why it cannot be corrected.  ends: offset of
-    the last motion of a fact -> its row.
+    never_from: the first row of those that never run.  strays: the robot may be elsewhere before each.  problems: row
+    -> why it cannot be corrected.  ends: offset of the last motion of a fact -> its row.
     """
 
     facts: list[MotionFact]
@@ -63,6 +63,7 @@ class ModuleRows:
     cfx: Ints
     texts: MotionTexts
     never_from: int
+    strays: bool
     ends: dict[int, int] = field(default_factory=dict)
     problems: dict[int, Problem] = field(default_factory=dict)
     axes: dict[int, tuple[float, ...]] = field(default_factory=dict)
@@ -94,7 +95,7 @@ class ModuleRows:
         where they are too many to be distinguished."""
         at = self.fact_of[row]
         if self.first[at] < row < self.never_from:
-            return (row - 1,)
+            return (ELSEWHERE, row - 1) if self.strays else (row - 1,)
         places = self.facts[at].before
         if not distinguished(places):
             return (ELSEWHERE,)
@@ -122,7 +123,7 @@ def module_rows(
     """The rows of a module, with the frames that they use."""
     frames = ModuleFrames(symbols, _declared_lines(document, flow))
     never = list(_never_run(flow))
-    rows = _rows(document, list(flow.facts.values()), [fact for fact, _ in never])
+    rows = _rows(document, list(flow.facts.values()), [fact for fact, _ in never], flow.usage.strays)
     bounds = rows.first.tolist()[len(flow.facts) :]
     for (_, problem), start, stop in zip(never, bounds[:-1], bounds[1:], strict=True):
         rows.refuse_all(range(start, stop), problem)
@@ -132,7 +133,7 @@ def module_rows(
     return rows, frames
 
 
-def _rows(document: Document, run: list[MotionFact], never: list[MotionFact]) -> ModuleRows:
+def _rows(document: Document, run: list[MotionFact], never: list[MotionFact], strays: bool) -> ModuleRows:
     """The rows of facts, those that run and those that never do, without frames, configurations and external axes."""
     facts = [*run, *never]
     first = sums(np.array([fact.count for fact in facts], np.int64))
@@ -176,6 +177,7 @@ def _rows(document: Document, run: list[MotionFact], never: list[MotionFact]) ->
         cfx=np.full(n, -1, np.int32),
         texts=MotionTexts(document.raw, texts, places, first, fact_of),
         never_from=int(first[len(run)]),
+        strays=strays,
         ends=ends,
     )
 

@@ -72,7 +72,7 @@ def module_toolpath(
         constraints=EditConstraints(
             refused=refused,
             locked=_locked(document, rows, flow, refused),
-            no_insert_before=_no_insert_before(rows, continues, refused),
+            no_insert_before=_no_insert_before(rows, flow.mixed, continues, refused),
         ),
         orientation_control=OrientationControl(
             mode=rows.per_row([fact.orientation for fact in facts], np.int8)
@@ -133,7 +133,8 @@ def _continues(rows: ModuleRows) -> Bools:
     """(N,) each motion surely starts where the row before it ends, and no other motion starts there."""
     first = [row for row in rows.first[:-1].tolist() if row < rows.never_from]
     before = [rows.before(row) for row in first]
-    found = follow_on(np.arange(len(rows)) < rows.never_from, first, before)
+    joined = (np.arange(len(rows)) < rows.never_from) & (not rows.strays)
+    found = follow_on(joined, first, before)
     many = {one for fact in rows.facts for one in fact.before if isinstance(one, Meeting)}
     crowd = np.array(rows.rows_of(many, set()), np.int64)
     found[crowd[crowd < len(rows) - 1] + 1] = False
@@ -198,8 +199,10 @@ def _pose(frame: FrameRef) -> Poses | None:
     return Poses.identity() if frame.number == 0 else frame.pose
 
 
-def _no_insert_before(rows: ModuleRows, continues: Bools, refused: Mapping[int, Finding]) -> dict[int, str]:
-    """Rows before which nothing can be inserted."""
+def _no_insert_before(
+    rows: ModuleRows, mixed: set[int], continues: Bools, refused: Mapping[int, Finding]
+) -> dict[int, str]:
+    """Rows before which nothing can be inserted.  mixed: offsets of comments before which others may be in force."""
     same = rows.quadrants >= 0
     same[1:] &= rows.quadrants[1:] == rows.quadrants[:-1]
     same[:1] = False
@@ -215,6 +218,8 @@ def _no_insert_before(rows: ModuleRows, continues: Bools, refused: Mapping[int, 
             why = "it starts or carries a process whose distances count from its own start"
         elif b"T" in fact.arguments.options:
             why = "its time is stated (\\T)"
+        elif any(one.start > fact.statement.start and one.start in mixed for one in fact.remarks()):
+            why = "before the comment in its line several others may be in force"
         wordless = "" if text.target is not None and text.target.words else NO_WORDS
         for row in range(start, stop) if why or wordless else [start]:
             no_insert_before[row] = why or wordless

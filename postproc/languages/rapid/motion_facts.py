@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from postproc.languages.core.motion_sources import Meeting, Source, met
 from postproc.languages.core.waits import Waits
+from postproc.languages.rapid.data_types import STOP_KINDS
 from postproc.languages.rapid.evaluation import Evaluator
 from postproc.languages.rapid.instructions import (
     HALTING,
@@ -76,6 +77,10 @@ class MotionFact:
     def count(self) -> int:
         """How many motions it represents."""
         return 1 if self.lines is None else len(self.lines)
+
+    def remarks(self) -> list[Remark]:
+        """The comments that are in force."""
+        return [one for one in (self.force, self.switch) if isinstance(one, Remark)]
 
     def joined(self, other: MotionFact, meeting: Meeting) -> MotionFact:
         """What holds in both executions; meeting: that of what runs before them."""
@@ -213,6 +218,9 @@ def _speed(arguments: MotionArguments, form: MotionForm, state: ProgramState, ev
 
 def _zone(arguments: MotionArguments, evaluator: Evaluator) -> tuple[float, bool]:
     """[mm] by which the TCP may leave its path before the target, and whether the robot stops there."""
+    if b"INPOS" in arguments.options:  # what it states takes the place of the zone
+        surely = _stops_at(arguments.options[b"INPOS"], evaluator)
+        return (0.0 if surely else NAN), surely
     value = _value(arguments.zone, evaluator)
     stops = truth_of(first_of(value))
     own = switch_value(arguments.options.get(b"Z"))
@@ -222,6 +230,12 @@ def _zone(arguments: MotionArguments, evaluator: Evaluator) -> tuple[float, bool
         return 0.0, True
     size = number_of(evaluator.value(own)) if own is not None else number_of(item_of(value, 1))
     return (NAN if size is None or size < 0 else size), False
+
+
+def _stops_at(argument: Argument, evaluator: Evaluator) -> bool:
+    """Whether the robot surely stops at a point with this stoppointdata: not where it follows a conveyor."""
+    kind = number_of(first_of(_value(argument, evaluator)))
+    return kind in (STOP_KINDS[b"INPOS"], STOP_KINDS[b"STOPTIME"])
 
 
 def first_of(value: Value) -> Value:

@@ -157,7 +157,7 @@ class ModuleParser(RapidExpressionParser):
         while True:
             word = self._word()
             if word in _HANDLERS:
-                handlers.append(Label(b"", self.take().start))
+                handlers.append(Label(word, self.take().start))
                 if self.sign(b"("):
                     while self.next.kind != END and not self.sign(b")"):
                         self.take()

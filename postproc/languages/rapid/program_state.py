@@ -34,7 +34,7 @@ class ProgramState:
     """``values``: of variables that are assigned anywhere; ``last``: offsets of the motions after which the robot is
     here.  ``displaced``: instructions in force that displace targets; ``override``: factor of speeds, None where it is
     not known; ``orientation``: OrientationMode by SingArea; ``arc``: ArcFrame by CirPathMode.  ``force``, ``switch``:
-    the FORCE and COMPENSATE comments in force.
+    the FORCE and COMPENSATE comments in force; ``concurrent``: the program may go on while the last motion runs.
     """
 
     values: PersistentMap = field(default_factory=lambda: PersistentMap(KeyNumbers()))
@@ -48,11 +48,12 @@ class ProgramState:
     checks_linear: bool | None = True
     checks_joint: bool | None = True
     waits: Waits = Waits.NO
+    concurrent: bool = False
 
     def copy(self) -> ProgramState:
         return ProgramState(
             self.values, self.last, self.displaced, self.override, self.orientation, self.arc, self.force,
-            self.switch, self.checks_linear, self.checks_joint, self.waits,
+            self.switch, self.checks_linear, self.checks_joint, self.waits, self.concurrent,
         )  # fmt: skip
 
     def take(self, other: ProgramState) -> None:
@@ -84,6 +85,7 @@ class ProgramState:
             self.checks_linear = None
         self.checks_joint = self.checks_joint if self.checks_joint == other.checks_joint else None
         self.waits = self.waits if self.waits == other.waits else Waits.MAYBE
+        self.concurrent |= other.concurrent
         return self.values is not before[0] or _set_apart(self) != before[1]
 
 
@@ -91,7 +93,7 @@ def _set_apart(state: ProgramState) -> tuple[object, ...]:
     """What holds but for values."""
     return (
         state.last, state.displaced, state.override, state.orientation, state.arc, state.force, state.switch,
-        state.checks_linear, state.checks_joint, state.waits,
+        state.checks_linear, state.checks_joint, state.waits, state.concurrent,
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 from postproc.languages.core.motion_sources import Meeting, Source
 from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.core.waits import Waits
-from postproc.languages.rapid.call_effects import CallEffects, ModeChanges, mode_changes
+from postproc.languages.rapid.call_effects import CallEffects, ModeChanges, leaving_words, mode_changes
 from postproc.languages.rapid.declared_data import DeclaredData, Usage, first_value, names_in, walk
 from postproc.languages.rapid.evaluation import Evaluator, is_component, unknown_record
 from postproc.languages.rapid.flow_graph import FlowGraph, Step
@@ -31,7 +31,8 @@ from postproc.languages.rapid.instructions import (
     is_motion,
 )
 from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read, override_of, waits_at
-from postproc.languages.rapid.program_state import ELSEWHERE, START, ProgramState
+from postproc.languages.rapid.program_state import ELSEWHERE, START, VARYING, ProgramState
+from postproc.languages.rapid.routine_entries import program_entries, run_again, run_aside, value_at_start
 from postproc.languages.rapid.routine_names import RoutineNames
 from postproc.languages.rapid.routine_runner import RoutineRunner
 from postproc.languages.rapid.syntax_tree import (
@@ -40,13 +41,11 @@ from postproc.languages.rapid.syntax_tree import (
     DataDeclaration,
     Expression,
     Instruction,
-    Leave,
     Module,
     NotUnderstood,
     PlainMotions,
     RapidRoutine,
     Remark,
-    Statement,
 )
 from postproc.languages.rapid.values import UnknownData, Value, plain, replaced, truth_of
 from postproc.toolpath import ArcFrame, Kind, OrientationMode
@@ -67,11 +66,6 @@ def _length(statement: object) -> int:
     return len(statement) if isinstance(statement, PlainMotions) else 1
 
 
-def leaving_words(body: tuple[Statement, ...]) -> set[bytes]:
-    """RETURN and other words that leave statements, or start them again."""
-    return {one.word for one in walk(body) if isinstance(one, Leave)}
-
-
 class TooLong(Exception):
     """The flow is too long to follow."""
 
@@ -80,7 +74,7 @@ class Propagation:
     """Runs a module.  ``facts``: offset of a motion -> its fact, in the order in which they run first; ``passed``:
     comments in that order with the number of motions before each; ``calls``: name of what is not in the file -> offset
     of its first call; ``reads``: where the place of the robot is read -> the motions after which; ``unread``:
-    statements that are not understood."""
+    statements that are not understood; ``mixed``: comments before which several others may be in force."""
 
     def __init__(self, module: Module, raw: bytes) -> None:
         self.module = module
@@ -98,6 +92,8 @@ class Propagation:
         self.calls: dict[bytes, int] = {}
         self.reads: defaultdict[int, set[Source]] = defaultdict(set)
         self.unread: dict[int, NotUnderstood] = {}
+        self._strayed = frozenset([ELSEWHERE] if self.usage.strays else [])
+        self._again: set[bytes] = set()  # routines of which not each run is followed
         self._graphs: dict[bytes, FlowGraph] = {}
         self._effects = CallEffects(self.usage)
         self._names = RoutineNames(self.data, self.usage)
@@ -108,26 +104,20 @@ class Propagation:
         self._restarts = any(b"EXITCYCLE" in leaving_words(body) for body in bodies)
         self._numbers = KeyNumbers()
         self._meetings: defaultdict[int, Meeting] = defaultdict(Meeting)
+        self.mixed: set[int] = set()
         self.rows = 0
         self.waited: set[Source] = set()
         self._steps = MOST_STEPS + 4 * sum(_length(one) for r in module.routines for one in walk(r.body))
-        self._runner = RoutineRunner(self._after)
+        self._runner = RoutineRunner(self._after, lambda: len(self._names.aliased))
 
     def run(self) -> None:
         """Follows the program from main, and every routine that nothing in the file calls.  Raises TooLong."""
-        called = set().union(*self.usage.calls.values()) if self.usage.calls else set()
-        entries = [
-            routine
-            for routine in self.module.routines
-            if routine.kind == b"PROC" and (routine.name not in called or routine.name == b"MAIN")
-        ]
-        main = self.routines.get(b"MAIN")
-        if main is None and len(entries) == 1:
-            main = entries[0]
-        entries.sort(key=lambda routine: routine is not main)
+        main, entries = program_entries(self.module, self.usage)
+        aside = run_aside(self.module, self.usage)
         for routine in entries:
-            if not self.is_unclear(routine):
-                self._enter(routine, routine is main)
+            self._enter(routine, routine is main, routine is not main and routine.name in aside)
+        for name in run_again(aside | self._again, entries, main, self.usage):
+            self._enter(self.routines[name], False, True)
 
     def is_unclear(self, routine: RapidRoutine) -> bool:
         """Whether the structure of a routine is not understood, or its name is that of several."""
@@ -139,11 +129,17 @@ class Propagation:
             graph = self._graphs[routine.name] = FlowGraph(routine.body)
         return graph
 
-    def _enter(self, routine: RapidRoutine, is_main: bool) -> None:
-        state = ProgramState(PersistentMap(self._numbers), frozenset([START if is_main else ELSEWHERE]))
+    def _enter(self, routine: RapidRoutine, is_main: bool, is_aside: bool) -> None:
+        """Runs a routine; ``is_aside``: the file itself calls it, where the flow does not show it."""
+        if routine.kind != b"PROC" or self.is_unclear(routine):
+            return
+        places = frozenset([START if is_main else ELSEWHERE]) | self._strayed
+        state = ProgramState(PersistentMap(self._numbers), places)
         for name in self.usage.assigned:
             if name in self.data and not self.data.is_constant(name):
-                state.put(name, self._value_at_start(name, is_main))
+                state.put(name, value_at_start(self.data, name, is_main))
+        if is_aside:
+            mode_changes(one.body for one in self.module.routines).lose(state, b"its caller")
         if self._aside:
             state.displaced |= {b"a trap or an error handler"}
         if is_main:
@@ -152,14 +148,6 @@ class Propagation:
         end = self._routine(routine, state, True)
         if end is not None:
             self._leave_place(end)
-
-    def _value_at_start(self, name: bytes, is_main: bool) -> Value:
-        shown = name.decode("latin-1")
-        if not is_main:
-            return UnknownData(f"{shown} is assigned elsewhere")
-        if self.data.kind_of(name) == b"PERS":
-            return UnknownData(f"{shown} has at the start the value of an earlier run")
-        return self.data.look(name)[0]
 
     def _start_again(self, main: RapidRoutine, state: ProgramState) -> None:
         """Takes in what the last run of main left, with which it starts again."""
@@ -196,7 +184,7 @@ class Propagation:
             found = self._changes[name] = mode_changes(routine.body for routine in routines)
         found.lose(state, b"a routine")
         if not reach.routines.isdisjoint(self.usage.moves):
-            self._leave_place(state)
+            state.last |= {ELSEWHERE}  # or it is where it was
 
     def _leave_place(self, state: ProgramState) -> None:
         """What the file does not contain goes on, or nothing does."""
@@ -260,6 +248,7 @@ class Propagation:
             return
         for name in step.names:
             self._forget(name, state, "a statement that is not understood may change it")
+        state.waits = max(state.waits, Waits.MAYBE)
         self._leave_place(state)
         if step.names & (DISPLACING | RESTORING.keys()):
             state.displaced |= {b"a statement that is not understood"}
@@ -268,10 +257,10 @@ class Propagation:
         if self._runner.recording:
             self.passed.setdefault(step.start, (step, self.rows))
         word = step.text.split(" ")[0].split("\t")[0].split(",")[0].upper()
-        if word == "FORCE":
-            state.force = step
-        elif word == "COMPENSATE":
-            state.switch = step
+        if place := {"FORCE": "force", "COMPENSATE": "switch"}.get(word):
+            if getattr(state, place) is VARYING:
+                self.mixed.add(step.start)
+            setattr(state, place, step)
 
     def _instruction(self, step: Instruction, state: ProgramState) -> None:
         name = step.name
@@ -284,8 +273,8 @@ class Propagation:
         elif name in MOTIONS:
             if self._runner.recording:
                 self._record(step.start, motion_fact(step, MOTIONS[name], state, self._evaluator(state)))
-            self._moved(step.start, state)
-            if name.endswith(b"SYNC"):
+            self._moved(step, step.start, state)
+            if MOTIONS[name].calls and self.usage.synchronous_call(step) not in self.routines:
                 self.calls.setdefault(step.name, step.start)
         elif name in OTHER_MOTIONS:
             self._not_read(step, state, "this form of motion is not read")
@@ -298,7 +287,10 @@ class Propagation:
     def _setting(self, step: Instruction, state: ProgramState) -> None:
         name = step.name
         options = {argument.name for argument in step.arguments}
-        state.waits = max(state.waits, waits_at(step, self._evaluator(state)))
+        waits = waits_at(step, self._evaluator(state))
+        if state.concurrent and name == b"WAITTIME" and b"INPOS" not in options:
+            waits = min(waits, Waits.MAYBE)  # it starts with the motion, and may be over before this is
+        state.waits = max(state.waits, waits)
         if name in DISPLACING:
             state.displaced |= {name}
             if name in READERS:
@@ -332,18 +324,20 @@ class Propagation:
         """A motion of which only its place is known."""
         if self._runner.recording:
             self._record(step.start, not_read(step, OTHER, state, message))
-        self._moved(step.start, state)
+        self._moved(step, step.start, state)
 
     def _plain(self, step: PlainMotions, state: ProgramState) -> None:
         """Motions that are run one after the other."""
         if self._runner.recording:
             fact = motion_fact(step.first, MOTIONS[step.first.name], state, self._evaluator(state))
             self._record(step.start, replace(fact, lines=step))
-        self._moved(step.last, state)
+        self._moved(step.first, step.last, state)
 
-    def _moved(self, at: int, state: ProgramState) -> None:
-        """What holds after the motion at an offset."""
-        state.last, state.waits = frozenset([at]), Waits.NO
+    def _moved(self, motion: Instruction, at: int, state: ProgramState) -> None:
+        """What holds after a motion, or the last one of its kind at an offset."""
+        state.last = frozenset([at]) | self._strayed
+        state.waits = Waits.NO
+        state.concurrent = any(argument.name == b"CONC" for argument in motion.arguments)
 
     def _record(self, at: int, fact: MotionFact) -> None:
         """Takes up the fact of the motion at an offset."""
@@ -373,6 +367,7 @@ class Propagation:
     def _call(self, routine: RapidRoutine, step: Instruction, state: ProgramState) -> None:
         """Runs a routine of the file with its arguments."""
         if routine in self._names.active or len(self._names.active) >= DEEPEST or self.is_unclear(routine):
+            self._again |= self._effects.of(routine.name).routines
             self._unread_call(step, state, moves=True)
             self._lose_effects(routine.name, state)
             return

@@ -20,15 +20,24 @@ NESTED = 1
 DEEPEST = 20
 """Loops in each other that are run by themselves; those in them are run together."""
 
-After = Callable[[FlowGraph, int, ProgramState], list[tuple[int, ProgramState]]]
+LONG = 8
+"""Statements of a block from which on it is remembered what it did with the states of its last runs."""
+KEPT = 3
+"""Runs that are remembered."""
+
+Led = list[tuple[int, ProgramState]]
+"""Where a block leads, and what holds there."""
+After = Callable[[FlowGraph, int, ProgramState], Led]
 
 
 class RoutineRunner:
-    """``after``: runs a block, and gives where it leads and what holds there; ``recording``: what runs is taken up."""
+    """``after``: runs a block, and gives where it leads and what holds there; ``version``: a number that changes where
+    that may become another one; ``recording``: what runs is taken up."""
 
-    def __init__(self, after: After) -> None:
-        self._after = after
+    def __init__(self, after: After, version: Callable[[], int]) -> None:
+        self._run_block, self._version = after, version
         self.recording = False
+        self._known: dict[tuple[int, int], list[tuple[ProgramState, int, Led]]] = {}
         self._left = 0  # statements and blocks that can still be run in loops
         self._deep = 0  # loops in each other
         self._unknown = 0  # loops that are run until nothing changes
@@ -49,6 +58,21 @@ class RoutineRunner:
         finally:
             self.recording = before
         return _joined(ends, graph.meetings[-1])
+
+    def _after(self, graph: FlowGraph, at: int, state: ProgramState) -> Led:
+        """Runs a block with ``state``, which is not kept; a long one that ran with the same is not run again."""
+        if self.recording or len(graph.blocks[at].steps) < LONG:
+            return self._run_block(graph, at, state)
+        runs = self._known.setdefault((id(graph), at), [])
+        version = self._version()
+        for before, known, led in runs:
+            if known == version and before.is_same(state):
+                return [(there, after.copy()) for there, after in led]
+        before = state.copy()
+        led = self._run_block(graph, at, state)
+        runs.append((before, self._version(), [(there, after.copy()) for there, after in led]))
+        del runs[:-KEPT]
+        return led
 
     def _region(
         self, graph: FlowGraph, first: int, stop: int, state: ProgramState, ends: list[ProgramState]

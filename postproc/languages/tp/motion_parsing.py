@@ -30,13 +30,14 @@ _ACTION = (
     + _REGISTER
     + rb"))"
 )
+_ALTERING = re.compile(rb"CALL|POINT_LOGIC|A?+R[ \t]*+\[", re.I)
 _CARRIED = re.compile(
     rb"[ \t]*+(?:ACC[ \t]*+(?:[0-9]++|A?+R" + _REGISTER + rb")|PTH|PSPD[ \t]*+[0-9]++)(?![A-Z0-9_.])", re.I
 )
 _WRIST = re.compile(rb"[ \t]*+Wjnt\b", re.I)
 _OWN = re.compile(
-    rb"[ \t]*+(?:(?:TB|TA)[ \t]*+[0-9]*+\.?+[0-9]*+[ \t]*+sec[ \t]*+,[ \t]*+" + _ACTION
-    + rb"|DB[ \t]*+-?+[0-9]*+\.?+[0-9]*+[ \t]*+mm[ \t]*+,[ \t]*+" + _ACTION
+    rb"[ \t]*+(?:(?:TB|TA)[ \t]*+[0-9]*+\.?+[0-9]*+[ \t]*+sec[ \t]*+,[ \t]*+(?P<at_time>" + _ACTION
+    + rb")|DB[ \t]*+-?+[0-9]*+\.?+[0-9]*+[ \t]*+mm[ \t]*+,[ \t]*+(?P<at_place>" + _ACTION + rb")"
     + rb"|(?:Arc|Weld)[ \t]++(?:Start|End)[ \t]*+(?:" + _REGISTER + rb")?+|SPOT" + _REGISTER + rb"|BREAK\b)",
     re.I,
 )  # fmt: skip
@@ -61,6 +62,8 @@ _MM = {b"mm/sec": 1.0, b"cm/min": 10 / 60, b"inch/min": 25.4 / 60}
 class _Options:
     carried: list[bytes]
     own: bool = False
+    alters: bool = False
+    relative: bool = False
     wrist: bool = False
     problem: tuple[str, str] | None = None
     skip: int | None = None
@@ -100,7 +103,7 @@ def parse_motion(text: bytes) -> TpMove | None:
     problem = ("FTP002", reason) if reason else options.problem
     return TpMove(
         form, tuple(points), shown, value, unit, termination, corner[:2], b" ".join(options.carried), options.own,
-        options.wrist, problem, options.skip, head.span(1),
+        options.wrist, problem, options.skip, head.span(1), options.alters, options.relative,
     )  # fmt: skip
 
 
@@ -162,8 +165,11 @@ def _read_options(text: bytes, at: int, options: _Options) -> int:
             options.carried.append(found[0].strip())
         elif (found := _OWN.match(text, after)) is not None:
             options.own = True
+            action = found["at_time"] or found["at_place"]
+            options.alters |= action is not None and _ALTERING.match(action) is not None
         elif (found := _DISPLACED.match(text, after)) is not None:
             name = found[1].decode("latin-1")
+            options.relative |= name.upper() == "INC"
             options.problem = options.problem or ("FTP008", f"its target is displaced ({name})")
         elif (found := _COORDINATED.match(text, after)) is not None:
             name = found[1].decode("latin-1")

@@ -135,9 +135,11 @@ class TpPropagation:
     reads: dict[int, frozenset[int]] = field(default_factory=dict)
     unread: set[int] = field(default_factory=set)
     waits: dict[int, Waits] = field(default_factory=dict)
+    _alters: bool = field(init=False)
 
     def __post_init__(self) -> None:
         self.before = [None] * len(self.flow.statements)
+        self._alters = any(isinstance(one, TpMove) and one.alters for one in self.flow.statements)
 
     def run(self, state: TpState) -> None:
         """Follows the program from its first statement."""
@@ -198,6 +200,7 @@ class TpPropagation:
         state, last, waits = reached
         if isinstance(one, TpMove):
             # where a displaced or interrupted motion ends is not in the text
+            state = replace(state, base=None, tool=None, registers=()) if one.alters else state
             ends = {ELSEWHERE} if one.problem is not None else {at, ELSEWHERE} if state.displaced else {at}
             return Reached(state, frozenset(ends))
         if isinstance(one, StatementNotRead) and one.moves:
@@ -223,7 +226,8 @@ class TpPropagation:
                 number = int(value) if value is not None and value == int(value) and value >= 0 else None
                 return replace(state, tool=number) if one.is_tool else replace(state, base=number)
             case RegisterAssignment():
-                return state.with_register(one.register, state.result(one.value))
+                # what a motion calls after some time may set it again
+                return state.with_register(one.register, None if self._alters else state.result(one.value))
             case LoopStart():
                 return state.with_register(one.register, None)
             case PositionUse():

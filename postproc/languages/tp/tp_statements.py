@@ -42,7 +42,8 @@ class TpMove:
     its unit; ``termination``: its text; ``corner``: FINE, CNT or CR with its number, None where a register has it;
     ``carried``: options that inserted motions have too; ``own``: it has options that count from its own start;
     ``wrist``: Wjnt; ``problem``: code and reason for which it is not corrected; ``skip``: label to which it may lead.
-    ``head``: start and stop of the letter of its form in the text of the statement.
+    ``head``: start and stop of the letter of its form in the text of the statement; ``alters``: what it does beside
+    its path (TB, TA, DB) may set registers; ``relative``: its target counts from where the robot is (INC).
     """
 
     form: bytes
@@ -58,6 +59,8 @@ class TpMove:
     problem: tuple[str, str] | None
     skip: int | None
     head: tuple[int, int]
+    alters: bool = False
+    relative: bool = False
 
 
 @dataclass(frozen=True, slots=True)

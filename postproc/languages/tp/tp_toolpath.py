@@ -138,6 +138,12 @@ def _locked(
                     "FTP012",
                     f"the arc in line {rows.lines[row]} starts at this end point and is not corrected",
                 )
+    for row, move in enumerate(rows.moves):
+        if move is None or not move.relative:
+            continue
+        for one in rows.before(row):
+            if one >= 0:
+                lock(one, "FTP008", f"the motion in line {rows.lines[row]} counts from its end (INC)")
     for at, places in sorted(run.reads.items()):
         for place in sorted(places):
             if place >= 0:

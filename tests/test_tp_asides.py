@@ -1,0 +1,58 @@
+"""Fanuc TP: what motions do beside their path, and what counts from where they end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from postproc.base.document import Document
+from postproc.languages import DIALECTS
+from postproc.toolpath import Toolpath
+
+POINT = """P[{}]{{
+   GP1:
+\tUF : 1, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',
+\tX = {}.000  mm,\tY = 0.000  mm,\tZ = 0.000  mm,
+\tW = 180.000 deg,\tP = 0.000 deg,\tR = 0.000 deg
+}};
+"""
+
+
+def read(*lines: str) -> Toolpath:
+    body = ["UFRAME_NUM=1", "UTOOL_NUM=1", *lines]
+    text = "".join(f"{n:4d}:  {line} ;\n" for n, line in enumerate(body, 1))
+    points = "".join(POINT.format(n, 10 * n) for n in range(1, 6))
+    raw = f"/PROG PART\n/ATTR\n/MN\n{text}/POS\n{points}/END\n".encode()
+    return DIALECTS["tp"].read((Document(Path("part.ls"), raw),)).toolpath
+
+
+@pytest.mark.parametrize("option", ["TB .10sec,CALL OTHER", "TA .10sec,CALL OTHER(1)", "DB 5.0mm,CALL OTHER"])
+def test_a_program_beside_a_motion_may_set_registers_at_any_time(option: str) -> None:
+    path = read("R[1]=50", f"L P[1] R[1]mm/sec FINE {option}", "R[1]=60", "L P[2] R[1]mm/sec FINE")
+    assert np.isnan(path.feed).all()
+    path = read("R[1]=50", "L P[1] R[1]mm/sec FINE TA .10sec,DO[1]=ON", "R[1]=60", "L P[2] R[1]mm/sec FINE")
+    np.testing.assert_allclose(path.feed, [0.05, 0.06])
+
+
+def test_a_program_beside_a_motion_decides_jumps() -> None:
+    lines = [
+        "R[1]=1",
+        "L P[1] 9mm/sec FINE TB .10sec,CALL OTHER",
+        "IF R[1]=2,JMP LBL[1]",
+        "L P[2] 9mm/sec FINE",
+        "LBL[1]",
+    ]
+    path = read(*lines, "L P[3] 9mm/sec FINE")
+    assert path.predecessors[2] == (0, 1)
+
+
+def test_the_motion_before_an_increment_stays() -> None:
+    path = read(
+        "L P[1] 9mm/sec FINE", "L P[2] 9mm/sec FINE", "L P[3] 9mm/sec FINE INC", "L P[4] 9mm/sec FINE"
+    )
+    assert path.constraints.refused[2].code == "FTP008"
+    assert list(path.constraints.locked) == [1]
+    assert "INC" in path.constraints.locked[1].message
+    assert not read("L P[1] 9mm/sec FINE", "L P[2] 9mm/sec FINE Offset,PR[1]").constraints.locked
