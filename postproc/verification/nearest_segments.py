@@ -1,7 +1,7 @@
 """How far points are from a polygon, each from the part of it near the point: the largest of these distances.
 
-Only the largest counts, so most points are done with the segment at which they are passed: where that is nearer than the
-largest distance that is known, all of the polygon cannot be farther.
+Only the largest counts, so most points are done with the segment at which they are passed: where that is nearer than
+the largest distance that is known, all of the polygon cannot be farther.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ FIRST, MORE = 64, 8
 def largest_of_nearest(corners: Floats, last: Ints, point: Floats, near: tuple[Ints, Ints, Ints]) -> float:
     """[m] the largest distance of points (K, 3) [m] from their segments, 0 without a point; NaN where one is not known.
 
-    ``corners`` (S, 3) [m]: segment k leads from corner k to the next one, but from ``last`` (S,), the last corner of its
-    line, nowhere.  ``near``: of each point a segment (K,) that is probably the nearest, and the first (K,) of all that
-    count and the one behind the last (K,).
+    ``corners`` (S, 3) [m]: segment k leads from corner k to the next one, but from ``last`` (S,), the last corner of
+    its line, nowhere.  ``near``: of each point a segment (K,) that is probably the nearest, and the first (K,) of all
+    that count and the one behind the last (K,).
     """
     guess, first, stop = near
     guess = np.maximum(np.minimum(guess, stop - 1), first)

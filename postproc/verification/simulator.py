@@ -11,8 +11,8 @@ from postproc.base.geometry import Poses, lengths, turn_between
 from postproc.base.units import MM
 from postproc.compensation.problem import CompensationProblem
 from postproc.toolpath import Kind
-from postproc.verification.pairing import SAME, Pairing
 from postproc.verification.nearest_segments import largest_of_nearest
+from postproc.verification.pairing import SAME, Pairing
 from postproc.verification.path_grid import PathGrid
 from postproc.verification.path_samples import PathSamples, places_between
 from postproc.verification.run_path import RunPath

@@ -127,7 +127,9 @@ def stage_of(file: str, function: str) -> str:
 def resident() -> tuple[float, float]:
     """[MB] memory of this process now, and the part of it that is in no file."""
     with open("/proc/self/statm") as stream:
-        everything, files = (int(word) * os.sysconf("SC_PAGE_SIZE") / 1e6 for word in stream.read().split()[1:3])
+        everything, files = (
+            int(word) * os.sysconf("SC_PAGE_SIZE") / 1e6 for word in stream.read().split()[1:3]
+        )
     return everything, everything - files
 
 
