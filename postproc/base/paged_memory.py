@@ -37,8 +37,8 @@ LARGE = 8 << 20
 RESIDENT = 256 << 20
 """Bytes of files that may be resident before all of them are given back: twice as many bring no time."""
 
-WAITING = 256 << 20
-"""Bytes of files that are free and wait for the next array of their size: a new one takes longer to fill."""
+WAITING = 2 << 30
+"""Bytes of files that are free and wait for the next array: to fill a new one takes ten times as long."""
 
 LOOK = 32 << 20
 """Bytes of new arrays between two looks at what is resident."""
@@ -64,6 +64,7 @@ CODES = define(
 
 _PAGE = mmap.PAGESIZE
 _STEP = 16 * _PAGE
+_LEAF = _PAGE * _PAGE // 8
 _HEAD, _IS_MMAPPED = 16, 2
 _MAP_FIXED, _NOT_NEEDED_NOW = 0x10, 4
 _MMAP_THRESHOLD, _TRIM_THRESHOLD = -3, -1
@@ -199,9 +200,10 @@ class PagedStorage:
             _unmap(file)
             self.files.remove(file)
             self.waiting.append(file)
-        length = -(-length // _STEP) * _STEP
-        found = next((file for file in self.waiting if file.length == length), None)
-        if found is not None:
+        length = -(-length // _STEP) * _STEP + _LEAF
+        fitting = [file for file in self.waiting if length <= file.length <= 2 * length]
+        if fitting:
+            found = min(fitting, key=lambda file: file.length)
             self.waiting.remove(found)
             return found
         while sum(file.length for file in self.waiting) > WAITING:
@@ -317,12 +319,13 @@ def _set_pages(address: int, length: int) -> None:
 
 def _map_over(address: int, length: int, file: IO[bytes]) -> bool:
     """Puts ``length`` bytes of ``file`` in the place of the pages at ``address``; False where that failed, and they
-    must not be used."""
+    must not be used.  They begin in the file as far behind a leaf as in memory, so that the system maps whole leaves:
+    page by page it takes twenty times as long to write to them again."""
     function = _libc.mmap
     function.restype = ctypes.c_void_p
     function.argtypes = (ctypes.c_void_p, ctypes.c_size_t, *(ctypes.c_int,) * 3, ctypes.c_long)
     access, flags = mmap.PROT_READ | mmap.PROT_WRITE, mmap.MAP_SHARED | _MAP_FIXED
-    return bool(function(address, length, access, flags, file.fileno(), 0) == address)
+    return bool(function(address, length, access, flags, file.fileno(), address % _LEAF) == address)
 
 
 def _unmap(file: PageFile) -> None:
