@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
 from functools import wraps
@@ -222,6 +223,64 @@ def test_pages_are_given_back_and_keep_what_they_hold(small, monkeypatch):
         else:
             pytest.fail("the pages stay resident")
         assert array.sum() == 8_000_000 * 7_999_999 // 2
+
+
+@pytest.mark.slow
+@alone
+def test_giving_pages_back_touches_no_other_memory(small):
+    """Arrays end at any moment, and other memory comes to where they were, while pages are given back all the time."""
+    done = threading.Event()
+    rng = np.random.default_rng(3)
+    with paged_memory.large_arrays_in_files(Path(__file__)):
+        storage = paged_memory.current_storage.get()
+
+        def give_back() -> None:
+            while not done.is_set():
+                storage.release()
+
+        threads = [threading.Thread(target=give_back) for _ in range(3)]
+        for thread in threads:
+            thread.start()
+        kept: dict[int, tuple[np.ndarray, int]] = {}
+        try:
+            for step in range(600):
+                size = int(rng.integers(20_000, 400_000))
+                if rng.random() < 0.5:
+                    array = np.full(size, step)
+                elif rng.random() < 0.5:
+                    array = paged_memory.with_small_arrays(lambda size: np.full(size, step), size)  # noqa: B023
+                else:
+                    array = np.zeros(size, int)
+                    assert not array.any()
+                    array += step
+                kept[int(rng.integers(20))] = array, step
+                for other, number in kept.values():
+                    assert (other[:: 1 + step % 97] == number).all()
+        finally:
+            done.set()
+            for thread in threads:
+                thread.join()
+        assert len(storage.files) <= 21
+    for other, number in kept.values():
+        assert (other == number).all()
+
+
+@alone
+def test_an_array_in_a_file_becomes_smaller_and_larger(small):
+    """In the run and after it; the C library knows of one page of it alone, and then again of all."""
+    with paged_memory.large_arrays_in_files(Path(__file__)):
+        array = np.arange(300_000)
+        for size in (200_000, 5_000, 400_000, 100_000):
+            array.resize(size, refcheck=False)
+            known = min(size, 5_000) if size >= 100_000 and size != 200_000 else size
+            assert np.array_equal(array[:known], np.arange(known))
+        array = np.arange(300_000)
+        count = len(paged_memory.current_storage.get().files)
+        assert count
+    for size in (250_000, 500_000, 1_000):
+        array.resize(size, refcheck=False)
+        assert np.array_equal(array[: min(size, 250_000)], np.arange(min(size, 250_000)))
+    del array
 
 
 def failing(at: int) -> Iterator[float]:

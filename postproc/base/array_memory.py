@@ -38,6 +38,9 @@ class ArrayPlace(Protocol):
         """Put other pages in the place of ``size`` bytes at ``address``, which hold nothing yet or ``zeros``; memory
         stays as it is where there is no room for them.  False where it is lost and must not be used."""
 
+    def held(self, address: int) -> int:
+        """Bytes at ``address`` where those of an array lie there, else 0: the C library knows nothing of them."""
+
 
 class _Allocator(ctypes.Structure):
     """``PyDataMemAllocator`` of numpy/ndarraytypes.h."""
@@ -78,7 +81,7 @@ def handler_for(place: ArrayPlace, usable: Callable[[int], int]) -> Any:
     realloc = ctypes.PYFUNCTYPE(*_REALLOC)(usual.realloc)
     free = ctypes.PYFUNCTYPE(*_FREE)(usual.free)
     # bound here: at the end of the process the names of modules may be gone before the last array
-    take_over, least, move = place.take_over, place.least, ctypes.memmove
+    take_over, held, least, move = place.take_over, place.held, place.least, ctypes.memmove
 
     def allocate(_: int | None, size: int) -> int | None:
         address: int | None = malloc(None, size)
@@ -93,12 +96,13 @@ def handler_for(place: ArrayPlace, usable: Callable[[int], int]) -> Any:
         return address
 
     def change_size(_: int | None, address: int, size: int) -> int | None:
-        if not address or size < least:
+        old = held(address) if address else 0
+        if not address or (size < least and not old):
             same: int | None = realloc(None, address, size)
             return same
         there = allocate(None, size)
         if there:
-            old = usable(address)
+            old = old or usable(address)
             move(there, address, min(size, old))
             free(None, address, old)
         return there

@@ -7,7 +7,7 @@ any leading shape and work without a loop over it.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,6 +60,14 @@ class Poses:
         same = len(self.position) and is_shared(self.position) and is_shared(self.rotation)
         return self[0] if same else self[rows]
 
+    @staticmethod
+    def joined(parts: Sequence[Poses]) -> Poses:
+        """The poses of all parts (N_k), one part after another."""
+        if len(parts) == 1:
+            return parts[0]
+        rotations, positions = [part.rotation for part in parts], [part.position for part in parts]
+        return Poses(np.concatenate(rotations), np.concatenate(positions))
+
     def copy(self) -> Poses:
         """The same poses, to be changed."""
         return Poses(self.rotation.copy(), self.position.copy())
@@ -78,11 +86,30 @@ class Poses:
 STORED = 1 << 14
 """Poses that are stored rather than computed again."""
 
+REMEMBERED = 1 << 16
+"""Poses of a run that is remembered, at most."""
+
 SMALL = 0.01
 """[rad] Angles up to which the first four terms of a series hold to rounding."""
 
 UNKNOWN = Poses(np.full((3, 3), np.nan), np.full(3, np.nan))
 """No pose."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """The ``poses`` of rows in a row, from ``start`` to before ``stop``."""
+
+    start: int
+    stop: int
+    poses: Poses
+
+    def __getitem__(self, asked: tuple[Ints, int, int]) -> Poses:
+        """Those of rows (K,), the least of them, and the one behind the largest."""
+        rows, low, high = asked
+        if high - low == len(rows) and bool((rows[1:] > rows[:-1]).all()):
+            return self.poses[low - self.start : high - self.start]
+        return self.poses[rows - self.start]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,20 +130,42 @@ class PoseRows:
         return self.count
 
     def remembered(self) -> PoseRows:
-        """The same: few are computed at once and stored; of more, each thread remembers the last rows that it was asked
-        for, as those of a block are asked for again and again."""
+        """The same: few are computed at once and stored; of more, each thread remembers a run of rows, those that it
+        asked for last with one before and one behind them, as those of a block and their neighbours are asked for
+        again and again.  What is given may be read-only."""
         if self.count <= STORED:
             return PoseRows(self.count, self[:].read_only().__getitem__)
         last = threading.local()
 
         def build(rows: Ints) -> Poses:
-            if getattr(last, "rows", None) is not rows:
-                poses = self.build(rows)
-                last.rows, last.poses = rows, poses.read_only()
-            last_poses: Poses = last.poses
-            return last_poses
+            low, high = (int(rows.min()), int(rows.max()) + 1) if len(rows) else (0, 0)
+            run = getattr(last, "run", _Run(0, 0, UNKNOWN))
+            if low < run.start or high > run.stop:
+                if low < 0 or high - low > min(REMEMBERED, 2 * len(rows)):
+                    return self.build(rows)  # they are here and there
+                run = last.run = self._run(max(low - 1, 0), min(high + 1, self.count), run)
+            return run[rows, low, high] if len(rows) else self.build(rows)
 
         return PoseRows(self.count, build)
+
+    def _run(self, start: int, stop: int, known: _Run) -> _Run:
+        """Those from ``start`` to before ``stop``, some of which may be ``known``."""
+        low, high = max(start, known.start), min(stop, known.stop)
+        if low >= high:
+            parts = [self._built(start, stop)]
+        else:
+            parts = [known.poses[low - known.start : high - known.start]]
+            if start < low:
+                parts.insert(0, self._built(start, low))
+            if high < stop:
+                parts.append(self._built(high, stop))
+        return _Run(start, stop, Poses.joined(parts).read_only())
+
+    def _built(self, start: int, stop: int) -> Poses:
+        """Those from ``start`` to before ``stop``; at least two are computed, as one alone is rounded otherwise."""
+        first = max(0, min(start, stop - 2))
+        last = min(self.count, max(stop, first + 2))
+        return self.build(np.arange(first, last))[start - first : stop - first]
 
     @property
     def position(self) -> Floats:

@@ -1,8 +1,9 @@
 """Programs larger than memory: inside of ``large_arrays_in_files`` large arrays and byte strings lie in temporary
 files.
 
-The system writes such pages to the disk and fetches them again as they are asked for, so that what is resident does not
-grow with the program.  The files have no name: whatever ends the process, nothing of them stays.
+What is resident does not grow with the program: the system takes such pages back, writes them to the disk where it
+needs their place, and fetches them again as they are asked for.  The files have no name: whatever ends the process,
+nothing of them stays.
 """
 
 from __future__ import annotations
@@ -10,7 +11,6 @@ from __future__ import annotations
 import ctypes
 import mmap
 import os
-import re
 import signal
 import sys
 import tempfile
@@ -37,8 +37,8 @@ LARGE = 8 << 20
 RESIDENT = 256 << 20
 """Bytes of files that may be resident before all of them are given back: twice as many bring no time."""
 
-WAITING = 256 << 20
-"""Bytes of files that are free and wait for the next array of their size: a new one takes longer to fill."""
+WAITING = 2 << 30
+"""Bytes of files that are free and wait for the next array: to fill a new one takes ten times as long."""
 
 LOOK = 32 << 20
 """Bytes of new arrays between two looks at what is resident."""
@@ -66,8 +66,12 @@ _PAGE = mmap.PAGESIZE
 _STEP = 16 * _PAGE
 _LEAF = _PAGE * _PAGE // 8
 _HEAD, _IS_MMAPPED = 16, 2
-_MAP_FIXED, _PAGE_OUT = 0x10, 21
+_MAP_FIXED, _NOT_NEEDED_NOW = 0x10, 4
 _MMAP_THRESHOLD, _TRIM_THRESHOLD = -3, -1
+
+_MEMORY = "/proc/self/mem"
+_FIRST_PAGE_ALONE = bytes(_HEAD // 2) + (_PAGE | _IS_MMAPPED).to_bytes(_HEAD // 2, sys.byteorder)
+"""The head of a block of the C library that is one page."""
 
 _libc: Any = ctypes.CDLL(None) if sys.platform == "linux" else None
 
@@ -135,66 +139,75 @@ def with_small_arrays(work: Callable[[Any], T], part: Any) -> T:
 
 @dataclass(eq=False)
 class PageFile:
-    """A file without a name for the pages of one array after another.  ``address``: where they are or were last;
-    ``mapped`` [bytes] of them; ``key``: by which the system lists the file as mapped, empty: not known."""
+    """A file without a name for the pages of one array after another.  ``address``: where ``mapped`` [bytes] of it
+    are, 0: nowhere yet."""
 
     stream: IO[bytes]
     length: int
     address: int = 0
     mapped: int = 0
-    key: bytes = b""
 
 
 class PagedStorage:
-    """The temporary files of one run.  What is in one is memory of the C library, which takes it back as always; a file
-    that is no longer mapped serves the next array."""
+    """The temporary files of one run.
+
+    The first page of such an array is memory of the C library, which takes that alone back when the array ends: its
+    head says that there is no more.  So what is mapped behind it is the storage's own until it is unmapped here, and
+    giving its pages back can touch no other memory, whenever the array ends.  A file that serves no array any more
+    serves the next one.
+    """
 
     def __init__(self, folder: str) -> None:
         self.folder, self.least = folder, LARGE
         self.files: list[PageFile] = []
+        """Those that are mapped; their arrays may be gone."""
+        self.waiting: list[PageFile] = []
         self.since = 0
+        self.closed = False
+        self._lists = threading.RLock()
+        self._memory = os.open(_MEMORY, os.O_RDONLY)
 
     def take_over(self, address: int, size: int, zeros: bool) -> bool:
         """See ``ArrayPlace``."""
         # the first page keeps the head by which the C library knows what is its own
         start, length = address - _HEAD + _PAGE, _bytes_of_pages(address, size) - _PAGE
-        if length <= 0:
+        if length <= 0 or self.closed:
             return True
         self.since += length
         if self.since > LOOK:
             self.release()
-        file = self._file_of(length)
-        if file is None:
-            return True
-        if not _map_over(start, length, file.stream):
-            return False
-        if zeros and file.address:
+        with self._lists:
+            file = self._file_of(length)
+            if file is None:
+                return True
+            if not _map_over(start, length, file.stream):
+                return False
+            _set_pages(address, _PAGE)
+            used, file.address, file.mapped = bool(file.address), start, length
+            self.files.append(file)
+        if zeros and used:
             ctypes.memset(start, 0, length)
-        file.address, file.mapped = start, length
-        if not file.key:
-            # the numbers that os.stat knows are others on some file systems
-            found = re.search(rb"(?m)^%x-\S+ \S+ \S+( \S+ \d+ )" % start, _maps())
-            file.key = found[1] if found else b""
-        self.files.append(file)
         return True
+
+    def held(self, address: int) -> int:
+        """See ``ArrayPlace``."""
+        start = address - _HEAD + _PAGE
+        return next((_PAGE - _HEAD + file.mapped for file in self.files if file.address == start), 0)
 
     def _file_of(self, length: int) -> PageFile | None:
         """A file with room for ``length`` bytes that is not mapped; None where the disk has no room."""
+        for file in [file for file in self.files if self._is_gone(file)]:
+            _unmap(file)
+            self.files.remove(file)
+            self.waiting.append(file)
         length = -(-length // _STEP) * _STEP + _LEAF
-        maps, waiting, kept, found = _maps(), 0, [], None
-        for file in self.files:
-            if file.key in maps:
-                kept.append(file)
-            elif found is None and file.length == length:
-                found = file
-            elif waiting + file.length <= WAITING:
-                waiting += file.length
-                kept.append(file)
-            else:
-                file.stream.close()
-        self.files = kept
-        if found is not None:
+        fitting = [file for file in self.waiting if length <= file.length <= 2 * length]
+        if fitting:
+            found = min(fitting, key=lambda file: file.length)
+            self.waiting.remove(found)
             return found
+        while sum(file.length for file in self.waiting) > WAITING:
+            self.waiting.pop(0).stream.close()
         try:
             stream = tempfile.TemporaryFile(dir=self.folder, buffering=0)  # noqa: SIM115  as long as it is mapped
             # a page for which the disk has no room later would end the process
@@ -203,15 +216,24 @@ class PagedStorage:
             return None
         return PageFile(stream, length)
 
+    def _is_gone(self, file: PageFile) -> bool:
+        """Whether the array of a file is at its end: the C library has taken back its first page, with the head that is
+        written nowhere else."""
+        try:
+            head = os.pread(self._memory, _HEAD, file.address - _PAGE)
+        except OSError:
+            return True
+        return head != _FIRST_PAGE_ALONE
+
     def release(self) -> None:
         """See ``release_pages``.  The pages of a file keep what they hold."""
         self.since = 0
         with open("/proc/self/statm", "rb") as stream:
             if int(stream.read().split()[2]) * _PAGE < RESIDENT:
                 return
-        for file in list(self.files):
-            # loses nothing wherever it is: the array may be gone, and other memory be there
-            _libc.madvise(ctypes.c_void_p(file.address), ctypes.c_size_t(file.mapped), _PAGE_OUT)
+        with self._lists:
+            for file in self.files:
+                _libc.madvise(ctypes.c_void_p(file.address), ctypes.c_size_t(file.mapped), _NOT_NEEDED_NOW)
 
     @contextmanager
     def watched(self) -> Iterator[None]:
@@ -250,15 +272,25 @@ class PagedStorage:
                 signal.raise_signal(number)
 
     def close(self) -> None:
-        """Keep nothing that is not asked for any more; what is mapped stays until its array ends."""
-        for file in self.files:
-            file.stream.close()
-        self.files.clear()
+        """Keep nothing that is not asked for any more; the C library takes back all of an array that is still there."""
+        with self._lists:
+            for file in self.files:
+                if self._is_gone(file):
+                    _unmap(file)
+                else:
+                    _set_pages(file.address - _PAGE + _HEAD, _PAGE + file.mapped)
+            for file in [*self.files, *self.waiting]:
+                file.stream.close()
+            self.files.clear()
+            self.waiting.clear()
+            self.closed = True
+            os.close(self._memory)
 
 
 def _has_pages_of_arrays() -> bool:
-    """Whether the C library is one (glibc) of which it is known how it keeps large blocks."""
-    return hasattr(_libc, "gnu_get_libc_version")
+    """Whether the C library is one (glibc) of which it is known how it keeps large blocks, and the process may look
+    into its own memory."""
+    return hasattr(_libc, "gnu_get_libc_version") and os.access(_MEMORY, os.R_OK)
 
 
 def _usable(address: int) -> int:
@@ -266,11 +298,6 @@ def _usable(address: int) -> int:
     function = _libc.malloc_usable_size
     function.restype, function.argtypes = ctypes.c_size_t, (ctypes.c_void_p,)
     return int(function(address))
-
-
-def _maps() -> bytes:
-    with open("/proc/self/maps", "rb") as stream:
-        return stream.read()
 
 
 def _bytes_of_pages(address: int, size: int) -> int:
@@ -285,15 +312,25 @@ def _bytes_of_pages(address: int, size: int) -> int:
     return length if zero == 0 and length % _PAGE == 0 and 0 <= length - size < 2 * _PAGE else 0
 
 
+def _set_pages(address: int, length: int) -> None:
+    """States in the head of the block at ``address`` how many bytes the C library takes back with it."""
+    ctypes.c_size_t.from_address(address - _HEAD // 2).value = length | _IS_MMAPPED
+
+
 def _map_over(address: int, length: int, file: IO[bytes]) -> bool:
     """Puts ``length`` bytes of ``file`` in the place of the pages at ``address``; False where that failed, and they
-    must not be used.  They begin in the file as far behind a leaf as in memory: groups of pages that lie across two
-    leaves would never be given back."""
+    must not be used.  They begin in the file as far behind a leaf as in memory, so that the system maps whole leaves:
+    page by page it takes twenty times as long to write to them again."""
     function = _libc.mmap
     function.restype = ctypes.c_void_p
     function.argtypes = (ctypes.c_void_p, ctypes.c_size_t, *(ctypes.c_int,) * 3, ctypes.c_long)
     access, flags = mmap.PROT_READ | mmap.PROT_WRITE, mmap.MAP_SHARED | _MAP_FIXED
     return bool(function(address, length, access, flags, file.fileno(), address % _LEAF) == address)
+
+
+def _unmap(file: PageFile) -> None:
+    """Takes back what is mapped of a file whose array is gone."""
+    _libc.munmap(ctypes.c_void_p(file.address), ctypes.c_size_t(file.mapped))
 
 
 def _handlers() -> dict[int, Callable[[int, FrameType | None], Any]]:

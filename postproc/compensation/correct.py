@@ -131,7 +131,7 @@ def correct(task: CompensationProblem) -> CorrectionResult:
     result = CorrectionResult(
         state,
         cut,
-        PoseRows(n, lambda rows: _moved(task.wanted[rows], shift[rows], turn[rows])),
+        PoseRows(n, lambda rows: _moved(task.wanted[rows], shift[rows], turn[rows])).remembered(),
         shift,
         turn,
         corrections.deflection,

@@ -179,7 +179,7 @@ class DivisibleMotions:
         low, high = self.low[chosen][owner], self.high[chosen][owner]
         at = self.rows[path][owner]
         first, last = (self._shares(at, low, high, part / count[owner]) for part in (number, number + 1))
-        end = self.full.command[at]
+        end = self.full.command[at].copy()
         inner = np.flatnonzero(last < 1.0)
         end.put(inner, self.commands(at[inner], last[inner]))
         start = self.path_starts(path[owner])

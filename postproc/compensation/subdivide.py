@@ -107,7 +107,7 @@ def _build_subdivision(motions: DivisibleMotions) -> Subdivision:
 
     def command(rows: Ints) -> Poses:
         at = source[rows]
-        commands = full[at]
+        commands = full[at].copy()
         if len(lead_ins):
             near = np.minimum(np.searchsorted(lead_ins, at), len(lead_ins) - 1)
             some = np.flatnonzero((lead_ins[near] == at) & is_own[rows])
@@ -121,7 +121,7 @@ def _build_subdivision(motions: DivisibleMotions) -> Subdivision:
         source,
         role,
         share,
-        PoseRows(len(source), command),
+        PoseRows(len(source), command).remembered(),
         arcs[0],
         arcs[1],
         arcs[2],
@@ -138,7 +138,7 @@ def _scaled(task: CompensationProblem, division: Subdivision) -> Subdivision:
     source, desired_path = division.source, task.desired_path
 
     def command(rows: Ints) -> Poses:
-        commands = division.command[rows]
+        commands = division.command[rows].copy()
         moved = np.flatnonzero(division.moved[rows])
         at, share = source[rows[moved]], division.share[rows[moved]]
         wanted = task.wanted[at].copy()
@@ -148,7 +148,7 @@ def _scaled(task: CompensationProblem, division: Subdivision) -> Subdivision:
         commands.put(moved, Poses(task.expressible_orientations(at, share, part.rotation), part.position))
         return commands
 
-    scaled = replace(division, command=PoseRows(len(division), command))
+    scaled = replace(division, command=PoseRows(len(division), command).remembered())
     curved = np.flatnonzero(np.isfinite(division.sweep))
     if not len(curved):
         return scaled

@@ -319,15 +319,17 @@ def _as_written(task: CompensationProblem, division: Subdivision, back: Toolpath
     source, base = division.source, task.base
 
     def command(rows: Ints) -> Poses:
-        poses = task.wanted[source[rows]].copy()
-        known = np.flatnonzero(np.isfinite(back.position[rows, 0]))
-        constant = np.flatnonzero(task.toolpath.keeps_orientation[source[rows]])
-        orientation = poses.rotation[constant]
-        poses.put(known, base.shared(source[rows[known]]) @ back.target_in_base[rows[known]])
-        poses.rotation[constant] = orientation  # not that of the text
+        at = source[rows]
+        known = np.isfinite(back.position[rows, 0])
+        keeps = np.flatnonzero(~known | task.toolpath.keeps_orientation[at])  # not that of the text
+        poses = base.shared(at) @ back.target_in_base[rows]
+        if len(keeps):
+            wanted, text = task.wanted[at[keeps]], known[keeps]
+            poses.rotation[keeps] = wanted.rotation
+            poses.position[keeps[~text]] = wanted.position[~text]
         return poses
 
-    there = replace(division, command=PoseRows(len(division), command), blend=back.approximation)
+    there = replace(division, command=PoseRows(len(division), command).remembered(), blend=back.approximation)
     arcs = np.flatnonzero(np.isfinite(division.sweep))
     if not len(arcs):
         return there

@@ -89,33 +89,34 @@ class RunPath:
     def _programmed(self, rows: Ints, share: Floats) -> Poses:
         """As ``at``, with all vertices as they are programmed.  What is the same along a motion is asked for once where
         several of the K places in a row are on it."""
-        path = self.task.desired_path
-        poses = Poses(np.empty((len(rows), 3, 3)), np.empty((len(rows), 3)))
         even = self._even[rows]
-        for some, is_even in ((np.flatnonzero(even), True), (np.flatnonzero(~even), False)):
-            if not len(some):
-                continue
-            if not is_even:
-                poses.put(some, path.at(rows[some], share[some]))
-                continue
-            motions, own = _runs(rows[some])
-            start, end = path.start[motions], path.end[motions]
-            turn = turn_between(start.rotation, end.rotation)
-            part = share[some][:, None]
-            poses.position[some] = start.position[own] + part * (end.position - start.position)[own]
-            poses.rotation[some] = start.rotation[own]
-            turns = np.flatnonzero((lengths(turn) > _NO_TURN)[own])
-            if len(turns):
-                by = rotation_from_vector(part[turns] * turn[own[turns]])
-                at = some[turns]
-                poses.rotation[at] = product(by, poses.rotation[at])
+        if even.all():
+            return self._evenly(rows, share)
+        poses = Poses(np.empty((len(rows), 3, 3)), np.empty((len(rows), 3)))
+        for some, at in ((even, self._evenly), (~even, self.task.desired_path.at)):
+            if some.any():
+                poses.put(some, at(rows[some], share[some]))
         return poses
+
+    def _evenly(self, rows: Ints, share: Floats) -> Poses:
+        """As ``_programmed``, of motions that turn the tool evenly."""
+        path, (motions, own) = self.task.desired_path, _runs(rows)
+        start, end = path.start[motions], path.end[motions]
+        turn = turn_between(start.rotation, end.rotation)
+        part, way = share[:, None], end.position - start.position
+        position = start.position.take(own, axis=0) + part * way.take(own, axis=0)
+        rotation = start.rotation.take(own, axis=0)
+        turns = np.flatnonzero((lengths(turn) > _NO_TURN)[own])
+        if len(turns):
+            by = rotation_from_vector(part[turns] * turn[own[turns]])
+            rotation[turns] = product(by, rotation[turns])
+        return Poses(rotation, position)
 
     def _programmed_tangent(self, rows: Ints, share: Floats) -> Floats:
         """As ``tangent``, with all vertices as they are programmed."""
         desired_path = self.task.desired_path
         motions, own = _runs(rows)
-        tangents = desired_path.tangent(motions, np.zeros(len(motions)))[own]
+        tangents = desired_path.tangent(motions, np.zeros(len(motions))).take(own, axis=0)
         arcs = np.flatnonzero(desired_path.arc[rows])
         if len(arcs):
             tangents[arcs] = desired_path.tangent(rows[arcs], share[arcs])

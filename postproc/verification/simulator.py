@@ -11,6 +11,7 @@ from postproc.base.geometry import Poses, lengths, turn_between
 from postproc.base.units import MM
 from postproc.compensation.problem import CompensationProblem
 from postproc.toolpath import Kind
+from postproc.verification.nearest_segments import largest_of_nearest
 from postproc.verification.pairing import SAME, Pairing
 from postproc.verification.path_grid import PathGrid
 from postproc.verification.path_samples import PathSamples, places_between
@@ -314,29 +315,17 @@ class Simulator:
         grid, place = self.grid, samples.place
         if not len(samples.motion) or not place.settled.all():
             return float("nan") if len(samples.motion) else 0.0
-        there = place.tool
         far = 2 * float(grid.arc.max()) + 1.0
         passed = np.maximum.accumulate(samples.stretch * far + place.arc)
         some = grid.gap | np.append(True, grid.gap[:-1])
         node = (np.repeat(np.arange(len(grid.first) - 1), np.diff(grid.first)) * far + grid.arc)[some]
-        vertex = grid.goal_at[some]
-        last = np.searchsorted(samples.stretch, samples.stretch, side="right") - 1
-        best = np.full(len(node), np.inf)
         # all that the program runs from BESIDE before it passes the place until as far after
         gone = np.cumsum(samples.distance_along)
         near = [np.minimum(np.searchsorted(passed, node, side), len(gone) - 1) for side in ("left", "right")]
         first = np.searchsorted(gone, gone[near[0]] - BESIDE) - 3
         stop = np.searchsorted(gone, gone[near[1]] + BESIDE) + 3
-        active = np.arange(len(node))
-        while len(active):
-            start = np.clip(first[active], 0, len(there) - 1)
-            end = np.minimum(start + 1, last[start])
-            path, out = there[end] - there[start], vertex[active] - there[start]
-            share = np.clip(np.sum(out * path, axis=1) / np.maximum(np.sum(path**2, axis=1), 1e-24), 0.0, 1.0)
-            best[active] = np.minimum(best[active], lengths(out - share[:, None] * path))
-            first[active] += 1
-            active = active[first[active] < stop[active]]
-        return float(best.max(initial=0.0))
+        last = np.searchsorted(samples.stretch, samples.stretch, side="right") - 1
+        return largest_of_nearest(place.tool, last, grid.goal_at[some], (near[0] - 1, first, stop))
 
 
 def _rows(start: Ints, stop: Ints) -> Ints:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from codecs import BOM_UTF8
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -245,32 +245,28 @@ def _other_lines(texts: list[bytes], rows: Ints, starts: Ints, control: Control)
     return _Other(words, notes, np.concatenate([rows[noted], deleted]), deleted)
 
 
+def _in_order(plain: _Plain, other: _Plain) -> _Plain:
+    """The words of both as they come in the text."""
+    order = np.argsort(np.concatenate([plain.at, other.at]), kind="stable")
+    pairs = ((getattr(plain, one.name), getattr(other, one.name)) for one in fields(_Plain))
+    return _Plain(*(np.concatenate(pair)[order] for pair in pairs))
+
+
 def _joined(
     feeds: Ints, plain: _Plain, other: _Other, starts: Ints, ends: Ints
 ) -> tuple[WordArrays, BlockSpans, tuple[Note, ...]]:
     """Words of plain and of other lines in one order; lines without words and notes are no blocks.  feeds: where LFs
     are; lines are counted from 0."""
-    extra = other.words
-    order = np.argsort(np.concatenate([plain.at, extra.at]), kind="stable")
-    lines = np.concatenate([plain.line, extra.line])[order]
+    all_words = plain if not len(other.words.at) else _in_order(plain, other.words)
+    lines, key, value, how = all_words.line, all_words.key, all_words.value, all_words.how
     some = np.zeros(len(starts), np.bool_)
     some[lines] = True
     some[other.commented] = True
     used = np.flatnonzero(some)
-    key = np.concatenate([plain.key, extra.key])[order]
-    value = np.concatenate([plain.value, extra.value])[order]
-    how = np.concatenate([plain.how, extra.how])[order]
     far = (np.abs(value) > FARTHEST) & np.isin(key & 0xFF, COORDINATES)
     value[far], how[far] = np.nan, How.UNREAD
-    words = WordArrays(
-        at=np.concatenate([plain.at, extra.at])[order],
-        start=np.concatenate([plain.start, extra.start])[order],
-        stop=np.concatenate([plain.stop, extra.stop])[order],
-        key=key,
-        value=value,
-        how=how,
-        block=np.searchsorted(used, lines),
-    )
+    block = np.searchsorted(used, lines)
+    words = WordArrays(all_words.at, all_words.start, all_words.stop, key, value, how, block)
     deleted = np.zeros(len(starts), np.bool_)
     deleted[other.deleted] = True
     first, code = starts[used].copy(), starts[used].copy()
