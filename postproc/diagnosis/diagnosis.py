@@ -104,7 +104,8 @@ def diagnose(
     agreed, clear_is_better = False, True
     if verdict.alternatives:
         stage("comparing the explanations over the workspace")
-        searched = _of_names(result.base, result.final, result, names)
+        # as it will be written: what the readings do not ask for makes no difference
+        searched = restore_unmoved_parameters(_of_names(result.base, result.final, result, names))
         disagreement = tuple(
             largest_disagreement(sample, result.base, searched, names, one) for one in verdict.alternatives
         )
