@@ -131,7 +131,8 @@ def diagnose(
     additional = {u.key for u in every.unknowns} - before
     final = restore_unmoved_parameters(every)
     # where an effect is missing in a model its own parameters compensate for that
-    moved = refitted(final, additional) if verdict.word not in ("ambiguous", "unknown") else ()
+    complete = verdict.word != "unknown" and (agreed or not verdict.alternatives)
+    moved = refitted(final, additional) if complete else ()
     final = cover_equivalent_models(final, every, result.base, names)
     if moved:
         # that something has moved is clear; which of equivalent parameters it is may not be

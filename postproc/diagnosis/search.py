@@ -80,7 +80,7 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
     # what a missing effect does to all readings of a pose looks like an error that they share
     weights = replace(base.weights, shared=0.0)
     every = drop_confounded(
-        base, weights, candidates(campaign, base.model, base.point.given, near=base.point)
+        campaign, base, weights, candidates(campaign, base.model, base.point.given, near=base.point)
     )
     shown = [c for c in every if is_visible(c, weights) and c.key not in banned]
     hidden = tuple(c for c in every if not is_visible(c, weights))
@@ -109,15 +109,24 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
         weights = limit_shared_scatter(base, fitted)
 
 
-def drop_confounded(base: Fit, weights: Weighting, every: Sequence[Candidate]) -> list[Candidate]:
+def drop_confounded(
+    campaign: Campaign, base: Fit, weights: Weighting, every: Sequence[Candidate]
+) -> list[Candidate]:
     """The candidates without those parameters that, in their usual size, do nothing observable but what parameters of
-    the robot file, or tracker and targets, do as well: a gain of the force is a softer arm."""
-    basis = basis_of(np.nan_to_num(np.concatenate([weights(part) for part in base.point.taken], axis=1)))
+    the robot file, or tracker and targets, do as well: a gain of the force is a softer arm.
+
+    Only within what is known of those: a zero and a twist about nearly the same line, half a radian against each other,
+    do whatever one likes.
+    """
+    known, _ = _priors(campaign, base, base)
+    taken = np.nan_to_num(np.concatenate([weights(part) for part in base.point.taken], axis=1))
+    basis = basis_of(np.concatenate([taken, known]))
     remaining = []
     for c in every:
         columns = np.nan_to_num(weights(c.columns))
         size = np.linalg.norm(columns, axis=0)
-        own = np.linalg.norm(outside(basis, columns), axis=0) > np.maximum(IMITATED * size, c.least)
+        beyond = outside(basis, np.concatenate([columns, np.zeros((len(known), columns.shape[1]))]))
+        own = np.linalg.norm(beyond[: len(taken)], axis=0) > np.maximum(IMITATED * size, c.least)
         if own.any():
             # those that only shape what another does are not judged by themselves
             own |= np.array([u.parameter.name in c.dormant_parameters for u in c.unknowns])
