@@ -37,8 +37,9 @@ def largest_disagreement(
     workspace and the loads that were used; infinite where an alternative has no equilibrium there.
 
     The alternative is fitted to what ``final`` predicts at the measured states, and starts with its values of what the
-    robot file states, so that only what it can not imitate counts, neither the scatter nor what is known of those.  Where tracker or targets are unknowns, what they make up for does not count: a base is
-    touched off, and a tool is calibrated, with the robot itself.
+    robot file states, so that only what it can not imitate counts, neither the scatter nor what is known of those.
+    Where tracker or targets are unknowns, what they make up for does not count: a base is touched off, and a tool is
+    calibrated, with the robot itself.
     """
     first, *others = alternatives
     expected = campaign.shifted(-np.nan_to_num(final.point.residual))

@@ -13,8 +13,9 @@ The evaluation works component-wise on arrays with the states in the last, conti
 of Pinocchio is the reference that it is held against; it is made where it is asked for, as Pinocchio takes longer to
 load than most programs to compensate, and has no wheels for Windows.
 
-A joint without a motor (``Passive``) is a coordinate too, with the same six before it.  A linkage or a gear makes it move with the joints that it
-follows, whatever moves these: their motors or a load.  What pushes it therefore pushes them.
+A joint without a motor (``Passive``) is a coordinate too, with the same six before it.  A linkage or a gear makes it
+move with the joints that it follows, whatever moves these: their motors or a load.  What pushes it therefore pushes
+them.
 """
 
 from __future__ import annotations
