@@ -105,6 +105,17 @@ def test_a_weight_that_is_hung_shows_the_stiffness_beside_the_sag(diagnosed):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("number", [0, 1, 4])
+def test_a_wrong_length_shows_beside_a_large_sag(diagnosed, number):
+    """A hundredth of what the sag does, and most of what that leaves."""
+    _, held, answer = diagnosed("soft", number, seed=77)
+    assert answer["verdict"] == "named"
+    assert "link_geometry" in {name for name, _ in real_command.pairs(answer)}
+    assert not held["a name that is wrong"]
+    assert held[real_command.NEW_OVER_OLD] < 0.05
+
+
+@pytest.mark.slow
 def test_reflectors_that_moved_less_than_a_wrong_geometry_misses(diagnosed):
     _, held, answer = diagnosed("remounted", 5)
     assert "IDN032" in {finding["code"] for finding in answer["findings"]}

@@ -46,6 +46,10 @@ effect does beside its law looks like small ones."""
 EXACT = (JointOffset.name, LinkGeometry.name)
 """Where axes lie is no law that could be inexact: however wrong a drawing was, what is small beside it counts."""
 
+MOST = 0.5
+"""Share of what otherwise remains from which on a place of an axis counts beside however large a law: what that does
+beside its form looks a little like many things, and for the most part like none."""
+
 SHARED = 1.0
 """Stated standard deviations that readings of a pose may share: of a robot that does not quite come back, of one
 unloaded reading.  What they share beyond that is no scatter."""
@@ -149,18 +153,22 @@ def _confirmed(
     while chosen:
         linear = _linear(campaign, base, limit_shared_scatter(base, base), fitted, chosen, chosen)
         places = range(len(chosen))
-        without = [explained(linear.problem, [g for g in places if g != gone]) for gone in places]
-        weakest = int(np.argmin([one.squares for one in without]))
+        without = [explained(linear.problem, [g for g in places if g != gone]).squares for gone in places]
+        gains = [squares - explained(linear.problem, places).squares for squares in without]
+        of_laws = [gain for gain, c in zip(gains, chosen, strict=True) if c.name not in EXACT]
+        floor = FORM * max(of_laws, default=0.0)
+        small = [
+            k
+            for k, c in enumerate(chosen)
+            if gains[k] < floor and not (c.name in EXACT and gains[k] > MOST * without[k])
+        ]
+        weakest = min(small or places, key=lambda k: gains[k])
         rest = tuple(c for k, c in enumerate(chosen) if k != weakest)
         fit_of_rest = with_effects(campaign, base, rest) if rest else base
         weights = limit_shared_scatter(base, fit_of_rest)
         given = _linear(campaign, base, weights, fitted, chosen, chosen).problem
         others = [g for g in places if g != weakest]
-        gains = [one.squares - explained(linear.problem, places).squares for one in without]
-        of_laws = [gain for gain, c in zip(gains, chosen, strict=True) if c.name not in EXACT]
-        if min(gains) >= FORM * max(of_laws, default=0.0) and counts(
-            given, explained(given, others), explained(given, places), among
-        ):
+        if not small and counts(given, explained(given, others), explained(given, places), among):
             break
         chosen, fitted = rest, fit_of_rest
     return chosen, fitted
