@@ -91,7 +91,9 @@ def test_what_no_library_has_gets_no_name(diagnosed, number):
 def test_a_sag_without_a_stiffness_is_found_joint_by_joint(diagnosed):
     _, held, answer = diagnosed("sag", 1)
     assert answer["verdict"] == "named"
-    assert real_command.pairs(answer) == {("gravity_sag", "A2"), ("gravity_sag", "A3")}
+    names = real_command.pairs(answer)
+    assert {name for name, _ in names} == {"gravity_sag"}
+    assert {("gravity_sag", "A2"), ("gravity_sag", "A3")} <= names
     assert held["gap closed"] > 0.95
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from postproc.base.arrays import Floats
 from postproc.effects.effect import Conditions, Offset, Parameter, Values, column
 from postproc.robot.chain import Chain
-from postproc.robot.geometries import Joint, Passive
+from postproc.robot.geometries import Joint
 
 
 class LinkGeometry(Offset):
@@ -25,11 +25,10 @@ class LinkGeometry(Offset):
     whole = True
 
     def __init__(self, joints: Sequence[Joint]) -> None:
-        numbered = [
-            (one.name, f"_{one.name}" if isinstance(one, Passive) else str(i))
-            for i, joint in enumerate(joints, 1)
-            for one in (*joint.passive, joint)
-        ]
+        numbered: list[tuple[str, str]] = []
+        for i, joint in enumerate(joints, 1):
+            numbered += [(passive.name, f"_{passive.name}") for passive in joint.passive]
+            numbered.append((joint.name, str(i)))
         axes = [(name, number, axis) for name, number in numbered[1:] for axis in ("x", "y", "rx", "ry")]
         self.coordinates = tuple(f"{name}.{axis}" for name, _, axis in axes)
         self.parameters = tuple(self._parameter(*one) for one in axes)
