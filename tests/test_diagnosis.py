@@ -4,17 +4,22 @@ from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from blind.arm import model_of, robot_file
+from blind.measured import readings as blind_readings
+from blind.real_worlds import campaign as drawn_campaign
 from measured import MARKERS, on_markers, plan, robot
 
 from postproc.base.geometry import Poses
-from postproc.diagnosis.candidates import candidates, fewest_parameters, is_visible
+from postproc.diagnosis import verdict
+from postproc.diagnosis.candidates import EVERY, candidates, fewest_parameters, is_visible
 from postproc.diagnosis.decoys import AlternativeForm, decoys
 from postproc.diagnosis.diagnosis import diagnose
 from postproc.diagnosis.nonlinear_effects import broyden_update, evaluate_at_size
-from postproc.diagnosis.residual_patterns import residual_patterns
+from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
 from postproc.diagnosis.search import SHARED, drop_confounded, limit_shared_scatter, model_unknowns, search
 from postproc.diagnosis.selection import complexity_penalty, counts, explained, problem
 from postproc.diagnosis.verdict import (
@@ -140,7 +145,7 @@ def test_a_gain_of_the_force_is_a_softer_arm():
     campaign = campaign_of(stated(), 20, loads=(1200.0, 2600.0))
     base = fitted(campaign)
     every = candidates(campaign, base.model, base.point.nuisances)
-    left = drop_confounded(base, replace(base.weights, shared=0.0), every)
+    left = drop_confounded(campaign, base, replace(base.weights, shared=0.0), every)
     names = [
         {u.parameter.name for u in c.unknowns}
         for several in (every, left)
@@ -150,6 +155,24 @@ def test_a_gain_of_the_force_is_a_softer_arm():
     assert "gain" in names[0]
     assert names[1]
     assert "gain" not in names[1]
+
+
+def test_what_only_absurd_sizes_imitate_stays_to_be_found():
+    """A zero of A4 and a turn of A5 about nearly the same line, half a radian against each other, shift A6 sideways."""
+    model = model_of(robot_file(True, False, [("link_geometry", "A6")]))
+    full = model_of(robot_file(True, False))
+    place = next(i for i, t in enumerate(full.terms) if t.effect.name == "link_geometry")
+    design = replace(drawn_campaign(np.random.default_rng(5), 40, stated=True), jitter=0.0)
+    empty = Campaign(blind_readings(design, np.zeros((len(design.q) * design.points, 3)), SIGMA))
+    true = full.with_values({(place, "dx5"): 4e-4, (place, "dy6"): 2e-4})
+    value = -empty.residual(empty.predicted(true), empty.start())[:, :3]
+    value = value + SIGMA * np.random.default_rng(6).normal(size=value.shape)
+    campaign = Campaign(replace(empty.readings, value=value))
+    base = fit(campaign, model, model_unknowns(model))
+    every = candidates(campaign, base.model, base.point.given)
+    left = drop_confounded(campaign, base, replace(base.weights, shared=0.0), every)
+    (sixth,) = [c for c in left if (c.name, c.joint) == ("link_geometry", "A6")]
+    assert "dy6" in {u.parameter.name for u in sixth.unknowns}
 
 
 def test_differences_show_no_places():
@@ -237,6 +260,30 @@ def test_a_wave_of_another_order_is_no_harmonic():
             assert named.evidence.alias is None or not isinstance(
                 named.evidence.alias.effect, AlternativeForm
             )
+
+
+def test_waves_of_all_gears_are_held_against_other_orders_in_all_of_them():
+    campaign = campaign_of(wave(stated(), 1.0), 20, deflection=False, in_robot_frame=True)
+    base = fitted(campaign)
+    whole_arm = [
+        c
+        for c in candidates(campaign, base.model, base.point.given)
+        if (c.name, c.joint) == ("transmission_error", EVERY)
+    ]
+    assert whole_arm
+    for mine in whole_arm:
+        against = decoys(base.model, campaign.readings.q, mine)
+        assert [len(one.unknowns) for one in against] == [12] * len(against)
+
+
+@pytest.mark.parametrize(
+    ("share", "known", "more"), [(0.05, True, False), (0.07, True, True), (0.05, False, True)]
+)
+def test_a_faint_pattern_leaves_a_name_as_it_is(monkeypatch, share, known, more):
+    monkeypatch.setattr(verdict, "reduced_chi2_of", lambda search, last: (1.0, False))
+    search = SimpleNamespace(linear=SimpleNamespace(problem=SimpleNamespace(known=known)), explained=None)
+    assert verdict.more_remains(search, [ResidualPattern("A2 over its angle", "", share)]) == more
+    assert not verdict.more_remains(search, [])
 
 
 @pytest.mark.slow

@@ -307,7 +307,7 @@ def test_offsets_are_linear_in_their_parameters(name):
 
 def test_flags_are_said_where_they_hold():
     said = {
-        "whole": {"joint_compliance", "joint_offset", "link_geometry", "transmission_error"},
+        "whole": {"gravity_sag", "joint_compliance", "joint_offset", "link_geometry", "transmission_error"},
         "by_direction": {"backlash", "hysteresis"},
         "by_gravity": {"gravity_sag"},
     }

@@ -36,13 +36,14 @@ def largest_disagreement(
     """[m] between what ``final`` and the same with an alternative in the place of the first one predict over the
     workspace and the loads that were used; infinite where an alternative has no equilibrium there.
 
-    The alternative is fitted to what ``final`` predicts at the measured states, so that only what it can not imitate
-    counts, and not the scatter.  Where tracker or targets are unknowns, what they make up for does not count: a base is
-    touched off, and a tool is calibrated, with the robot itself.
+    The alternative is fitted to what ``final`` predicts at the measured states, and starts with its values of what the
+    robot file states, so that only what it can not imitate counts, neither the scatter nor what is known of those.
+    Where tracker or targets are unknowns, what they make up for does not count: a base is touched off, and a tool is
+    calibrated, with the robot itself.
     """
     first, *others = alternatives
     expected = campaign.shifted(-np.nan_to_num(final.point.residual))
-    largest = 0.0
+    largest, base = 0.0, _with_values_of(base, final)
     states = _states(campaign, final.model)
     here = _places(campaign, final.model, *states)
     for other in others[:TRIED]:
@@ -53,6 +54,13 @@ def largest_disagreement(
         difference = _beyond_touching_off(campaign, final.model, states[0], difference)
         largest = max(largest, float(np.linalg.norm(difference, axis=1).max()))
     return largest
+
+
+def _with_values_of(base: Fit, final: Fit) -> Fit:
+    """``base`` with its own parameters as ``final`` has them, as if the robot file stated these values."""
+    values = {u.key: final.model.terms[u.term].values[u.parameter.name] for u in base.unknowns}
+    asked = tuple(replace(u, value=values.get(u.key, u.value)) for u in base.asked)
+    return replace(base, asked=asked, point=replace(base.point, model=base.model.with_values(values)))
 
 
 def without_effects(campaign: Campaign, fitted: Fit, gone: Sequence[Candidate]) -> Fit:

@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.base.arrays import Floats
 from postproc.diagnosis.candidate_fits import composed, point_without, with_effects
-from postproc.diagnosis.candidates import Candidate, fewest_parameters
+from postproc.diagnosis.candidates import EVERY, Candidate, fewest_parameters
 from postproc.diagnosis.decoys import decoys
 from postproc.diagnosis.nonlinear_effects import evaluate_at_size
 from postproc.diagnosis.search_result import Alternative, Linear
@@ -31,9 +31,13 @@ CLOSE, CLOSE_SHARE, RIVALS = 30.0, 0.05, 3
 """Alternatives are fitted where -2 ln(likelihood) is linearly worse by less than this, or than this share of the gain;
 so many at most."""
 
-TWIN, TWIN_SHARE = 4.0, 0.05
-"""An alternative that misses less of what a choice does, in variances of a reading and as a share of it, predicts the
-same."""
+TWIN, TWIN_SHARE = 0.0455, 0.05
+"""An alternative predicts the same as a choice that misses less of what this does than this share, and no more than
+chance makes of a parameter with this probability, four variances of a reading: of a choice for all joints, in which
+those that do not have it fit scatter, of each parameter that the alternative lacks."""
+
+LACKS = 0.1
+"""Share of a parameter's column that must lie outside of those of an alternative for this to lack it."""
 
 OUTLIER_LIMIT = 5.0
 """Standard deviations that a reading counts with at most."""
@@ -74,6 +78,8 @@ def find_alternatives(
             return given.matrix[:, given.places[g]] * given.size[given.places[g]]
 
         signal, beyond = _signal(given, rest, last, group), linear.basis_with(rest.groups)
+        whole_arm = given.matrix[:, given.places[group] if mine.joint == EVERY else []]
+        fits_scatter = beside(given, rest, whole_arm)
         own, of_mine = paid(scaled(group)), []
         against = [
             *enumerate(linear.candidates),
@@ -89,7 +95,7 @@ def find_alternatives(
                 columns = scaled(other)
             if rest.squares - squares > 0.5 * gain:
                 worse = float(squares - last.squares) / variance
-                twin = _predicts(beside(given, rest, columns), signal, variance)
+                twin = _predicts(beside(given, rest, columns), fits_scatter, signal, variance)
                 of_mine.append(Alternative(mine.key, instead, worse, paid(columns) - own, False, twin))
         # of one effect the form with fewest parameters that predicts the same
         twins = fewest_parameters([a.candidate for a in of_mine if a.twin])
@@ -113,11 +119,19 @@ def _signal(problem: Problem, rest: Explained, last: Explained, group: int) -> F
     return beside(problem, rest, does[:, None])[:, 0]
 
 
-def _predicts(columns: Floats, signal: Floats, variance: float) -> bool:
-    """Whether ``columns`` (n, p) can do what ``signal`` (n,) is."""
-    misses = outside(basis_of(columns), signal[:, None])[:, 0] if columns.any() else signal
+def _predicts(columns: Floats, fits_scatter: Floats, signal: Floats, variance: float) -> bool:
+    """Whether ``columns`` (n, p) can do what ``signal`` (n,) is, as far as the columns ``fits_scatter`` (n, k) that it
+    is a sum of do not fit scatter."""
+    from scipy.special import chdtri
+
+    basis = basis_of(columns) if columns.any() else np.zeros((len(signal), 0))
+    misses = outside(basis, signal[:, None])[:, 0]
     squares = float(misses @ misses)
-    return squares < TWIN * variance and squares < TWIN_SHARE * float(signal @ signal)
+    length = np.linalg.norm(fits_scatter, axis=0)
+    lacks = outside(basis, fits_scatter[:, length > 0] / length[length > 0])
+    lacking = int((np.linalg.svd(lacks, compute_uv=False) > LACKS).sum()) if lacks.size else 1
+    chance = float(chdtri(max(1, lacking), TWIN))
+    return squares < chance * variance and squares < TWIN_SHARE * float(signal @ signal)
 
 
 def _instead(

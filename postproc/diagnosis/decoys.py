@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from postproc.base.arrays import Floats
-from postproc.diagnosis.candidates import Candidate
+from postproc.diagnosis.candidates import EVERY, Candidate
 from postproc.effects import (
     ChainState,
     ComplianceLaw,
@@ -119,5 +119,5 @@ def decoys(model: StiffnessModel, q: Floats, mine: Candidate) -> list[Candidate]
 
 def _decoy(model: StiffnessModel, q: Floats, effect: AlternativeForm, joint: str) -> Candidate:
     wider = model.with_effect(effect)
-    unknowns = tuple(u for u in unknowns_of(wider, len(model.terms)) if u.parameter.joint == joint)
+    unknowns = tuple(u for u in unknowns_of(wider, len(model.terms)) if joint in (EVERY, u.parameter.joint))
     return Candidate(effect, joint, wider, unknowns, np.zeros((len(q), 3, len(unknowns))), True)

@@ -104,7 +104,8 @@ def diagnose(
     agreed, clear_is_better = False, True
     if verdict.alternatives:
         stage("comparing the explanations over the workspace")
-        searched = _of_names(result.base, result.final, result, names)
+        # as it will be written: what the readings do not ask for makes no difference
+        searched = restore_unmoved_parameters(_of_names(result.base, result.final, result, names))
         disagreement = tuple(
             largest_disagreement(sample, result.base, searched, names, one) for one in verdict.alternatives
         )
@@ -130,7 +131,8 @@ def diagnose(
     additional = {u.key for u in every.unknowns} - before
     final = restore_unmoved_parameters(every)
     # where an effect is missing in a model its own parameters compensate for that
-    moved = refitted(final, additional) if verdict.word not in ("ambiguous", "unknown") else ()
+    complete = verdict.word != "unknown" and (agreed or not verdict.alternatives)
+    moved = refitted(final, additional) if complete else ()
     final = cover_equivalent_models(final, every, result.base, names)
     if moved:
         # that something has moved is clear; which of equivalent parameters it is may not be

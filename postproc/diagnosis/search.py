@@ -46,6 +46,10 @@ effect does beside its law looks like small ones."""
 EXACT = (JointOffset.name, LinkGeometry.name)
 """Where axes lie is no law that could be inexact: however wrong a drawing was, what is small beside it counts."""
 
+MOST = 0.5
+"""Share of what otherwise remains from which on a place of an axis counts beside however large a law: what that does
+beside its form looks a little like many things, and for the most part like none."""
+
 SHARED = 1.0
 """Stated standard deviations that readings of a pose may share: of a robot that does not quite come back, of one
 unloaded reading.  What they share beyond that is no scatter."""
@@ -80,7 +84,7 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
     # what a missing effect does to all readings of a pose looks like an error that they share
     weights = replace(base.weights, shared=0.0)
     every = drop_confounded(
-        base, weights, candidates(campaign, base.model, base.point.nuisances, near=base.point)
+        campaign, base, weights, candidates(campaign, base.model, base.point.nuisances, near=base.point)
     )
     shown = [c for c in every if is_visible(c, weights) and c.key not in banned]
     hidden = tuple(c for c in every if not is_visible(c, weights))
@@ -109,17 +113,24 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
         weights = limit_shared_scatter(base, fitted)
 
 
-def drop_confounded(base: Fit, weights: Weighting, every: Sequence[Candidate]) -> list[Candidate]:
+def drop_confounded(
+    campaign: Campaign, base: Fit, weights: Weighting, every: Sequence[Candidate]
+) -> list[Candidate]:
     """The candidates without those parameters that, in their usual size, do nothing observable but what parameters of
-    the robot file, or tracker and targets, do as well: a gain of the force is a softer arm."""
-    basis = basis_of(
-        np.nan_to_num(np.concatenate([weights(part) for part in base.point.required_columns], axis=1))
-    )
+    the robot file, or tracker and targets, do as well: a gain of the force is a softer arm.
+
+    Only within what is known of those: a zero and a twist about nearly the same line, half a radian against each other,
+    do whatever one likes.
+    """
+    known, _ = _priors(campaign, base, base)
+    taken = np.nan_to_num(np.concatenate([weights(part) for part in base.point.required_columns], axis=1))
+    basis = basis_of(np.concatenate([taken, known]))
     remaining = []
     for c in every:
         columns = np.nan_to_num(weights(c.columns))
         size = np.linalg.norm(columns, axis=0)
-        own = np.linalg.norm(outside(basis, columns), axis=0) > np.maximum(IMITATED * size, c.least)
+        beyond = outside(basis, np.concatenate([columns, np.zeros((len(known), columns.shape[1]))]))
+        own = np.linalg.norm(beyond[: len(taken)], axis=0) > np.maximum(IMITATED * size, c.least)
         if own.any():
             # those that only shape what another does are not judged by themselves
             own |= np.array([u.parameter.name in c.dormant_parameters for u in c.unknowns])
@@ -142,18 +153,22 @@ def _confirmed(
     while chosen:
         linear = _linear(campaign, base, limit_shared_scatter(base, base), fitted, chosen, chosen)
         places = range(len(chosen))
-        without = [explained(linear.problem, [g for g in places if g != gone]) for gone in places]
-        weakest = int(np.argmin([one.squares for one in without]))
+        without = [explained(linear.problem, [g for g in places if g != gone]).squares for gone in places]
+        gains = [squares - explained(linear.problem, places).squares for squares in without]
+        of_laws = [gain for gain, c in zip(gains, chosen, strict=True) if c.name not in EXACT]
+        floor = FORM * max(of_laws, default=0.0)
+        small = [
+            k
+            for k, c in enumerate(chosen)
+            if gains[k] < floor and not (c.name in EXACT and gains[k] > MOST * without[k])
+        ]
+        weakest = min(small or places, key=lambda k: gains[k])
         rest = tuple(c for k, c in enumerate(chosen) if k != weakest)
         fit_of_rest = with_effects(campaign, base, rest) if rest else base
         weights = limit_shared_scatter(base, fit_of_rest)
         given = _linear(campaign, base, weights, fitted, chosen, chosen).problem
         others = [g for g in places if g != weakest]
-        gains = [one.squares - explained(linear.problem, places).squares for one in without]
-        of_laws = [gain for gain, c in zip(gains, chosen, strict=True) if c.name not in EXACT]
-        if min(gains) >= FORM * max(of_laws, default=0.0) and counts(
-            given, explained(given, others), explained(given, places), among
-        ):
+        if not small and counts(given, explained(given, others), explained(given, places), among):
             break
         chosen, fitted = rest, fit_of_rest
     return chosen, fitted

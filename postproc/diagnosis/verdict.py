@@ -49,6 +49,10 @@ EXCESS = 3.0
 STRUCTURE = 0.001
 """Probability that what remains shows a pattern by chance: one that follows a joint is no scatter, however small."""
 
+FAINT = 1 / 16
+"""Share of the remaining squares up to which a pattern, where the scatter is known, leaves a name as it is: a quarter
+of the scatter."""
+
 TOLERATED = 0.15
 """Share of the variance that heavier tails than normal may add."""
 
@@ -142,9 +146,9 @@ def judge(search: Search) -> Verdict:
     named, rejected, aliases = [], [], []
     zeros: list[tuple[Candidate, Evidence]] = []
     groups: list[int] = []
-    chi2, unexplained = reduced_chi2_of(search, last)
+    chi2, _ = reduced_chi2_of(search, last)
     patterns = residual_patterns(search.confirmed, chance=STRUCTURE)
-    unexplained = unexplained or bool(patterns)
+    unexplained = more_remains(search, patterns)
     for g in last.groups:
         candidate, its = linear.candidates[g], _evidence(search, last, g)
         estimates = _estimates(search.confirmed, candidate, search)
@@ -202,7 +206,7 @@ def judge(search: Search) -> Verdict:
         if named:
             rejected += [(candidate, NOT_ENOUGH) for candidate in rest]
     if not named:
-        word = "unknown" if unexplained or rejected else "nothing_missing"
+        word = "unknown" if unexplained or patterns or rejected else "nothing_missing"
     elif sets:
         word = "ambiguous"
     else:
@@ -288,6 +292,14 @@ def reduced_chi2_of(search: Search, last: Explained) -> tuple[float, bool]:
     if repeats:
         spread = np.sqrt(spread**2 + 2.0 / repeats)
     return variance, given.known and variance > 1.0 + TOLERATED + EXCESS * spread
+
+
+def more_remains(search: Search, patterns: Sequence[ResidualPattern]) -> bool:
+    """Whether more than scatter remains of what was chosen, whose residual has clear ``patterns``."""
+    known = search.linear.problem.known
+    return reduced_chi2_of(search, search.explained)[1] or any(
+        not known or one.share > FAINT for one in patterns
+    )
 
 
 def _evidence(search: Search, last: Explained, group: int) -> Evidence:

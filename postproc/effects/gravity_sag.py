@@ -30,6 +30,7 @@ class GravitySag(Offset):
     name = "gravity_sag"
     family = "weight"
     by_gravity = True
+    whole = True
 
     def __init__(self, joints: Sequence[Joint]) -> None:
         turning = [i for i, joint in enumerate(joints) if joint.kind == "revolute"]

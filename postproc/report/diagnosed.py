@@ -16,7 +16,7 @@ from postproc.diagnosis.effect_sizes import Gains, Smallest, detection_limits, g
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
 from postproc.diagnosis.search_result import Key
 from postproc.diagnosis.selection import explained
-from postproc.diagnosis.verdict import Evidence, Named, Verdict, reduced_chi2_of
+from postproc.diagnosis.verdict import Evidence, Named, Verdict, more_remains, reduced_chi2_of
 from postproc.identification.fit import Estimate, Fit
 from postproc.measurements import Readings
 from postproc.model import STANDARD_GRAVITY
@@ -167,8 +167,10 @@ class Diagnosed(Result):
     @property
     def scatter_exceeded(self) -> bool:
         """Whether the residual clearly exceeds the scatter, with all effects found."""
-        search = self.diagnosis.search
-        return reduced_chi2_of(search, search.explained)[1] or bool(self.verdict.remainder)
+        remainder = self.verdict.remainder
+        return more_remains(self.diagnosis.search, remainder) or (
+            bool(remainder) and self.verdict.word == "unknown"
+        )
 
     @property
     def needs_effects(self) -> bool:

@@ -134,6 +134,7 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
         )
         yield from _closed(result)
         yield from _more(result, "More is missing:", "after")
+        yield from _moved_too(result)
         yield "No pose and no load of this size separates what predicts the same; only an inspection of the robot does."
         return
     measured = bool(result.diagnosis.disagreement)
@@ -377,6 +378,8 @@ def _rest(result: Diagnosed) -> Iterator[str]:
         )
     else:
         yield f"The residual, {residual} mm RMS, is the scatter of the readings ({_mm(result.scatter)} mm)."
+    for one in result.verdict.remainder[:1]:
+        yield f"A small part of it, {100 * one.share:.1f} % of its squares, depends on {variable_words(one.variable)}."
 
 
 def _more(result: Diagnosed, start: str, fit: str) -> Iterator[str]:

@@ -13,8 +13,9 @@ The evaluation works component-wise on arrays with the states in the last, conti
 of Pinocchio is the reference that it is held against; it is made where it is asked for, as Pinocchio takes longer to
 load than most programs to compensate, and has no wheels for Windows.
 
-A joint without a motor (``Passive``) is a coordinate too.  A linkage or a gear makes it move with the joints that it
-follows, whatever moves these: their motors or a load.  What pushes it therefore pushes them.
+A joint without a motor (``Passive``) is a coordinate too, with the same six before it.  A linkage or a gear makes it
+move with the joints that it follows, whatever moves these: their motors or a load.  What pushes it therefore pushes
+them.
 """
 
 from __future__ import annotations
@@ -126,6 +127,7 @@ class Chain:
         for joint in joints:
             for passive in joint.passive:
                 self._at = self._at @ passive.placement
+                names += self._site(passive.name, wanted)
                 followers.append((len(names), passive.follows))
                 names.append(passive.name)
                 self._add(np.eye(3), passive.kind == "revolute")
