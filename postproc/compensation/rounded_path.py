@@ -131,8 +131,8 @@ class RoundedOutput:
 
     def peaks(self, at: Ints, share: Floats, closer: int = CLOSER) -> tuple[Floats, Floats]:
         """(K,) [m] and (K,) [rad]: by how much the tool is off at most at the shares (K, S) of the segments ``at``
-        (K, S), in the order of the path, ``closer`` times nearer around the ``PEAKS`` largest of its peaks, and where
-        the force starts or ends to change over a ramp: there it turns."""
+        (K, S), in the order of the path, ``closer`` times nearer around the ``PEAKS`` largest of its peaks, and at
+        the ``turns`` of the force."""
         many, count = share.shape
         off, angle = np.zeros(many), np.zeros(many)
         gap = np.where(np.diff(at, axis=1) == 0, np.diff(share, axis=1), 0.0)
@@ -163,16 +163,20 @@ class RoundedOutput:
 
     @cached_property
     def turns(self) -> Floats:
-        """(T, 2) rows and shares of the program's path near these motions where ramps of the force start or end."""
-        ramps = self.task.force.ramps
-        if ramps is None or not len(self.motions):
+        """(T, 2) rows and shares of the program's path near these motions where the force turns: where ramps of it start
+        or end, and where motions start, as it changes within them."""
+        if not len(self.motions):
             return np.empty((0, 2))
-        rows = self.segments.rows
-        row, share = ramps.ends()
-        start = ramps.row[ramps.start <= 0.0]
-        row, share = np.concatenate([row, start]), np.concatenate([share, np.zeros(len(start))])
-        near = np.isin(row, np.concatenate([rows, rows + 1]))
-        return np.stack([row[near], share[near]], axis=1)
+        rows = np.unique(self.segments.rows)
+        rows = np.union1d(rows, np.minimum(rows + 1, len(self.task.toolpath) - 1))
+        row = rows[self.task.carries[rows]]
+        share = np.zeros(len(row))
+        ramps = self.task.force.ramps
+        if ramps is not None:
+            end, at = ramps.ends()
+            near = np.isin(end, rows)
+            row, share = np.concatenate([row, end[near]]), np.concatenate([share, at[near]])
+        return np.stack([row, share], axis=1)
 
     def _where_force_turns(
         self, at: Ints, share: Floats, found: Deviations

@@ -213,7 +213,8 @@ def _along(wanted: Path, cut: tuple, path: Path, rows: tuple, one: Field, nodes:
     place, lost = find_places(wanted, cut, one, label, tools)
     for _ in range(ROUNDS):
         distance = np.linalg.norm(tools.loaded(one.at(place))[0] - wanted.points(place, *cut), axis=1)
-        more = _beside_worst(label, distance)
+        more = np.union1d(_beside_worst(label, distance), _at_vertices(wanted, cut, label, place))
+        more = np.setdiff1d(more, label)
         finer = Tools(path, rows, more, nodes)
         found, gone = settle_places(
             wanted, cut, one, np.interp(more, label, place), finer.loaded, reaches=BETWEEN
@@ -263,6 +264,14 @@ def _beside_worst(label: np.ndarray, distance: np.ndarray) -> np.ndarray:
     start = np.unique(np.clip(np.concatenate([worst - 1, worst]), 0, len(label) - 2))
     parts = np.arange(1, PARTS) / PARTS
     return (label[start, None] + parts * (label[start + 1] - label[start])[:, None]).ravel()
+
+
+def _at_vertices(wanted: Path, cut: tuple, label: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Labels at which the tool passes the vertices of the original's path: the force turns there, and the error with
+    it, in a peak that may lie between two samples."""
+    rising = np.maximum.accumulate(place)
+    inner = wanted.start[cut[0] + 1 : cut[1] + 1]
+    return np.interp(inner[(inner > rising[0]) & (inner < rising[-1])], rising, label)
 
 
 def _between(one: np.ndarray, two: np.ndarray) -> np.ndarray:
