@@ -9,7 +9,7 @@ evaluated again.  Where the point alone is not enough, others are inserted besid
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from postproc.compensation.corners import compare_corners_at, evaluate_corners, 
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.ramp_points import NEVER, LeastPoints, choose_ramp_points
-from postproc.compensation.rounded_path import Blend, RoundedOutput
+from postproc.compensation.rounded_path import Blend, Deviations, RoundedOutput
 from postproc.compensation.subdivision import Limits, Subdivision
 from postproc.toolpath import Role
 
@@ -227,6 +227,7 @@ def _evaluate(
     output = RoundedOutput(task, fitted.division, np.unique(np.concatenate([motions, motions + 1])))
     samples = _samples(fitted, output, part)
     found = output.deviations(samples.at, samples.share)
+    samples, found = _with_turns(samples, output, found)
     off, angle = lengths(found.shift), lengths(found.turn)
     largest = np.zeros(part.stop - part.start)
     np.maximum.at(largest, samples.group - part.start, _size(task, off, angle))
@@ -256,6 +257,24 @@ def _samples(fitted: CornerDivision, output: RoundedOutput, part: slice) -> _Cor
     share = np.minimum(share, np.where(last, after, 1.0)[:, None])
     many = share.shape[1]
     return _CornerSamples(np.repeat(group, many), np.repeat(at, many), share.ravel(), len(at))
+
+
+def _with_turns(
+    samples: _CornerSamples, output: RoundedOutput, found: Deviations
+) -> tuple[_CornerSamples, Deviations]:
+    """The same with the places where the force turns, and what is ``found`` (S) there: the error has a peak there."""
+    owner, at, share = samples.by_segment
+    last = None
+    for last in output.where_force_turns(at, share, found):
+        pass
+    if last is None:
+        return samples, found
+    which, segment, between, there = last
+    group = np.concatenate([samples.group, owner[which]])
+    order = np.argsort(group, kind="stable")
+    more = (np.concatenate([samples.at, segment])[order], np.concatenate([samples.share, between])[order])
+    both = (np.concatenate([getattr(one, f.name) for one in (found, there)])[order] for f in fields(Deviations))
+    return _CornerSamples(group[order], *more, samples.segments), Deviations(*both)
 
 
 def _weights(fitted: CornerDivision, output: RoundedOutput, samples: _CornerSamples, part: slice) -> Floats:

@@ -145,9 +145,10 @@ class RoundedOutput:
             angle = np.maximum(angle, turned.reshape(many, -1).max(axis=1))
             if level == closer:
                 break
-            if level == 0 and self.turns.size:
-                for part in self._where_force_turns(at, share, found):
-                    off, angle = np.maximum(off, part[0]), np.maximum(angle, part[1])
+            if level == 0:
+                for which, _, _, there in self.where_force_turns(at, share, found):
+                    np.maximum.at(off, which, lengths(there.shift))
+                    np.maximum.at(angle, which, lengths(there.turn))
             if level == 0:
                 padded = np.pad(here, ((0, 0), (1, 1)), constant_values=-1.0)
                 top = (here >= padded[:, :-2]) & (here >= padded[:, 2:])
@@ -178,11 +179,14 @@ class RoundedOutput:
             row, share = np.concatenate([row, end[near]]), np.concatenate([share, at[near]])
         return np.stack([row, share], axis=1)
 
-    def _where_force_turns(
+    def where_force_turns(
         self, at: Ints, share: Floats, found: Deviations
-    ) -> Iterator[tuple[Floats, Floats]]:
-        """Errors (K,) [m] and (K,) [rad] where the tool is at the ``turns`` of the force: between the two of the shares
-        (K, S) of the segments ``at`` (K, S) beside each, of which the places are ``found`` (K S)."""
+    ) -> Iterator[tuple[Ints, Ints, Floats, Deviations]]:
+        """Where the tool is at the ``turns`` of the force, nearer each time: between the two of the shares (K, S) of
+        the segments ``at`` (K, S) beside each, of which the places are ``found`` (K S).  Which (T,) of the K they are,
+        their segments (T,) and shares (T,), and the deviations (T) there."""
+        if not self.turns.size:
+            return
         low = int(min(found.row.min(), self.turns[:, 0].min()))
         high = int(max(found.row.max(), self.turns[:, 0].max()))
         length = self.task.desired_path.length[low : high + 1]
@@ -202,10 +206,7 @@ class RoundedOutput:
             between = ends[0] - away[0] * (ends[1] - ends[0]) / np.maximum(away[1] - away[0], NEAREST)
             between = np.clip(between, *ends)
             here = self.deviations(segment, between)
-            off, angle = np.zeros(len(at)), np.zeros(len(at))
-            np.maximum.at(off, which, lengths(here.shift))
-            np.maximum.at(angle, which, lengths(here.turn))
-            yield off, angle
+            yield which, segment, between, here
             gap = (
                 begins[np.clip(here.row - low, 0, len(length) - 1)]
                 + here.share * self.task.desired_path.length[here.row]
