@@ -25,6 +25,9 @@ STEPS, WEIGHINGS, SECANTS = 24, 8, 4
 FIRST, SHORTEST, LONGEST = 5e-4, 2e-6, 2e-3
 """[m] Length of a step: at first; where the search ends; at most."""
 
+SPREADS, TOO_SHORT = 12, 1e-7
+"""How often lines that are too short are made longer after a step, and by how much [m] they may be too short then."""
+
 ON_PARABOLA, ON_LINE = np.linspace(0.0, 1.0, 25), 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 21))
 """Where parabolas and lines are evaluated: lines closer near their ends, where curves turn."""
 
@@ -156,10 +159,11 @@ def fit_points(
         step = _least_largest(off, slope, damping[some]).reshape(len(some), -1, 3)
         step *= np.minimum(1.0, trust[some] / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-15))[:, None, None]
         moved = best.points[some]
-        factor = _possible(moved, step, shortest[some])
-        moved[:, 1:-1] += factor[:, None, None] * step
+        moved[:, 1:-1] += step
+        moved = _apart(moved, shortest[some])
         found = _evaluate(curves[some], moved, reach[some], best.parameter[some], best.label[some], vertex)
-        after = found.largest
+        long_enough = (_sizes(np.diff(moved, axis=1)) >= shortest[some] - TOO_SHORT).all(axis=1)
+        after = np.where(long_enough, found.largest, np.inf)
         won = after < largest[some]
         at = some[won]
         for name in ("points", "off", "slope", "parameter", "label"):
@@ -175,15 +179,23 @@ def _sizes(vectors: Floats) -> Floats:
     return np.asarray(np.sqrt(np.sum(vectors * vectors, axis=-1)))
 
 
-def _possible(points: Floats, step: Floats, shortest: Floats) -> Floats:
-    """(G,) shares of the steps (G, K - 2, 3) with which no line is too short, 0 where there is none."""
-    factor = np.zeros(len(points))
-    for share in (0.1, 0.25, 0.5, 1.0):
-        moved = points.copy()
-        moved[:, 1:-1] += share * step
-        good = (_sizes(np.diff(moved, axis=1)) >= shortest).all(axis=1)
-        factor = np.where(good, share, factor)
-    return factor
+def _apart(points: Floats, shortest: Floats) -> Floats:
+    """The points (G, K, 3) with the inner ones moved so far apart that lines are ``shortest`` (G, K - 1) [m] or longer;
+    some are shorter still where there is no room."""
+    inner = np.ones(points.shape[1])
+    inner[[0, -1]] = 0.0
+    share = inner[1:] / np.maximum(inner[1:] + inner[:-1], 1.0)
+    for _ in range(SPREADS):
+        step = np.diff(points, axis=1)
+        size = _sizes(step)
+        lack = np.maximum(shortest - size, 0.0)
+        if not lack.any():
+            break
+        push = (lack / np.maximum(size, 1e-12))[..., None] * step
+        points = points.copy()
+        points[:, 1:] += share[:, None] * push
+        points[:, :-1] -= (inner[:-1] * (1.0 - share))[:, None] * push
+    return points
 
 
 def _least_largest(off: Floats, slope: Floats, damping: Floats) -> Floats:
