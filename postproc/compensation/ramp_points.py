@@ -50,6 +50,9 @@ PLACES = 440
 ENOUGH = 0.85
 """Share of the allowed error with which a fit ends."""
 
+PAYS = 0.9
+"""Share of the error that is left which a fit with more points has to come below."""
+
 SHOWS = 0.9
 """Share of the tolerance: ramps whose ends are rounded off by less keep the one point that they have."""
 
@@ -82,12 +85,13 @@ class _FittedRamps:
 
 @dataclass(frozen=True)
 class _Found:
-    """Points of one ramp: places (n, 3), path lengths (n,) [m] from the vertex, and which of them is the motion that is
-    there already."""
+    """Points of one ramp: places (n, 3), path lengths (n,) [m] from the vertex, which of them is the motion that is
+    there already, and the largest error [m]."""
 
     place: Floats
     along: Floats
     own: int
+    largest: float
 
 
 def choose_ramp_points(
@@ -97,21 +101,31 @@ def choose_ramp_points(
     limits: Limits,
     least: LeastPoints,
     allowed: float,
-) -> tuple[Subdivision, ChosenPoints | None]:
-    """The division without the points of those ramps for which others were found, and these.  allowed [m]: error."""
+    anyhow: Ints,
+) -> tuple[Subdivision, ChosenPoints | None, Ints]:
+    """The division without the points of those ramps for which others were found, these, and the rows (L,) of the ramps
+    left.  allowed [m]: error; for ramps of the rows ``anyhow`` (A,) what comes nearest will do where nothing holds it.
+    """
     ramps, inner, fewest = _ramps(task, result, division, limits, least)
     if not len(ramps.row):
-        return division, None
+        return division, None, np.empty(0, np.int64)
     curves = _curves(task, division, ramps)
     spare = limits.inserted(len(task.toolpath)) - division.inserted
     found: dict[int, _Found] = {}
+    nearest: dict[int, _Found] = {}
     left = np.arange(len(ramps.row))
     for count in range(1, len(_STARTS) + 1):
         some = left[(fewest[left] <= count) & (count <= inner[left] + spare)]
-        if len(some):
-            found |= _fitted(ramps[some], curves[some], count, allowed, some)
+        for name, one in _fitted(ramps[some], curves[some], count, allowed, some).items():
+            if one.largest <= allowed:
+                found[name] = one
+            elif name not in nearest or one.largest < PAYS * nearest[name].largest:
+                nearest[name] = one
         left = np.array([k for k in left if k not in found], np.int64)
-    return _without_points(task, division, ramps, found)
+    wanted = np.isin(ramps.row, anyhow).tolist()
+    found |= {name: one for name, one in nearest.items() if name not in found and wanted[name]}
+    part, chosen = _without_points(task, division, ramps, found)
+    return part, chosen, ramps.row[[k for k in left if k not in found]]
 
 
 def _ramps(
@@ -329,7 +343,8 @@ def _apart(
 def _fitted(
     ramps: _FittedRamps, curves: Curves, count: int, allowed: float, names: Ints
 ) -> dict[int, _Found]:
-    """Of the ramps that ``count`` inserted points can follow, their points by ``names`` (G,)."""
+    """The points of ramps with ``count`` inserted ones that are within ``allowed`` [m], or come nearest to it, by
+    ``names`` (G,)."""
     found: dict[int, _Found] = {}
     for exact in (False, True):
         some = np.flatnonzero(ramps.exact == exact)
@@ -348,10 +363,11 @@ def _fitted(
             shortest = np.where(np.arange(width - 1) < vertex, part.spacing[:, :1], part.spacing[:, 1:])
             points, largest = fit_points(curve, parameter, reach, shortest, ENOUGH * allowed, vertex)
             along = curve.nearest(points, parameter)[:, 1:-1]
-            good = largest <= allowed
-            for k in np.flatnonzero(good).tolist():
-                found[int(names[some[left[k]]])] = _Found(points[k, 1:-1], along[k], place)
-            left = left[~good]
+            for k, size in enumerate(largest.tolist()):
+                name = int(names[some[left[k]]])
+                if name not in found or size < found[name].largest:
+                    found[name] = _Found(points[k, 1:-1], along[k], place, size)
+            left = left[largest > allowed]
             if not len(left):
                 break
     return found
