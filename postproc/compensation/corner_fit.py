@@ -165,8 +165,8 @@ def _fit_ramps(
     least: LeastPoints,
     anyhow: Ints,
 ) -> tuple[CorrectionResult, Subdivision, Ints]:
-    """The same with the points on ramps of the force, as few as hold the tolerance, and the rows (L,) of those left, but
-    for ``anyhow`` (A,)."""
+    """The same with the points on ramps of the force, as few as hold the tolerance, and the rows (L,) of those left,
+    but for ``anyhow`` (A,)."""
     least = dict(least)
     while True:
         part, chosen, left = choose_ramp_points(
@@ -336,16 +336,16 @@ def _with_turns(
 ) -> tuple[_CornerSamples, Deviations]:
     """The same with the places where the force turns, and what is ``found`` (S) there: the error has a peak there."""
     owner, at, share = samples.by_segment
-    last = None
-    for last in output.where_force_turns(at, share, found):
-        pass
-    if last is None:
+    nearer = list(output.where_force_turns(at, share, found))
+    if not nearer:
         return samples, found
-    which, segment, between, there = last
+    which, segment, between, there = nearer[-1]
     group = np.concatenate([samples.group, owner[which]])
     order = np.argsort(group, kind="stable")
     more = (np.concatenate([samples.at, segment])[order], np.concatenate([samples.share, between])[order])
-    both = (np.concatenate([getattr(one, f.name) for one in (found, there)])[order] for f in fields(Deviations))
+    both = (
+        np.concatenate([getattr(one, f.name) for one in (found, there)])[order] for f in fields(Deviations)
+    )
     return _CornerSamples(group[order], *more, samples.segments), Deviations(*both)
 
 

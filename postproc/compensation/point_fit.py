@@ -147,9 +147,9 @@ def fit_points(
     where on points are rounded off; shortest (G, K - 1) [m]: lines.  enough [m]: a distance that needs no improvement.
     vertex: which of the points is that between the motions.
     """
-    points = curves.at(parameter)[0]
+    points = _apart(curves.at(parameter)[0], shortest)
     best = _evaluate(curves, points, reach, None, parameter, vertex)
-    largest = best.largest
+    largest = np.where(_long_enough(points, shortest), best.largest, np.inf)
     trust, damping = np.full(len(points), FIRST), np.full(len(points), 1e-2)
     for _ in range(STEPS):
         some = np.flatnonzero((largest > enough) & (trust > SHORTEST))
@@ -162,8 +162,7 @@ def fit_points(
         moved[:, 1:-1] += step
         moved = _apart(moved, shortest[some])
         found = _evaluate(curves[some], moved, reach[some], best.parameter[some], best.label[some], vertex)
-        long_enough = (_sizes(np.diff(moved, axis=1)) >= shortest[some] - TOO_SHORT).all(axis=1)
-        after = np.where(long_enough, found.largest, np.inf)
+        after = np.where(_long_enough(moved, shortest[some]), found.largest, np.inf)
         won = after < largest[some]
         at = some[won]
         for name in ("points", "off", "slope", "parameter", "label"):
@@ -177,6 +176,11 @@ def fit_points(
 def _sizes(vectors: Floats) -> Floats:
     """(...) lengths of vectors (..., 3)."""
     return np.asarray(np.sqrt(np.sum(vectors * vectors, axis=-1)))
+
+
+def _long_enough(points: Floats, shortest: Floats) -> Bools:
+    """(G,) whether no line of the points (G, K, 3) is shorter than ``shortest`` (G, K - 1) [m]."""
+    return np.asarray((_sizes(np.diff(points, axis=1)) >= shortest - TOO_SHORT).all(axis=1))
 
 
 def _apart(points: Floats, shortest: Floats) -> Floats:

@@ -64,9 +64,9 @@ APART = 0.1
 class _FittedRamps:
     """G ramps.  vertex, knot (G,): the motions of the division that end where the ramp starts and where it ends; row
     (G,): of the program, with the ramp; end [m] (G,): its length; exact (G,): the vertex is; reach (G, 2) [m]: from
-    where on points before and after the vertex are rounded off; spacing (G, 2) [m]: the shortest motion before and after
-    the vertex; margin (G, 2) [m]: as far the curve goes on before and after; after (G,): the motion that ends in the
-    next point after those of the ramp; arc (G, 2): the motions before and after the vertex are."""
+    where on points before and after the vertex are rounded off; spacing (G, 2) [m]: the shortest motion before and
+    after the vertex; margin (G, 2) [m]: as far the curve goes on before and after; after (G,): the motion that ends in
+    the next point after those of the ramp; arc (G, 2): the motions before and after the vertex are."""
 
     vertex: Ints
     knot: Ints
@@ -210,7 +210,9 @@ def _ramps(
         behind[k] = min(behind[k], length[row[k] - 1] - others.max()) if len(others) else behind[k]
     most = reach.max(axis=1)
     # from the next point on an arc bends anew
-    half = np.where(arc, 1.0, 0.5) * np.minimum(np.stack([behind, beyond], axis=1), np.where(arc, np.inf, 1e3))
+    half = np.where(arc, 1.0, 0.5) * np.minimum(
+        np.stack([behind, beyond], axis=1), np.where(arc, np.inf, 1e3)
+    )
     straight = np.minimum(MARGIN + 2.0 * most, half.min(axis=1))
     margin = np.where(arc, np.minimum(half, ON_ARC), straight[:, None])
     good = (margin >= most[:, None] + 2.0 * spacing).all(axis=1) & (
@@ -239,7 +241,8 @@ def _rounded_off(
 def _curves(task: CompensationProblem, division: Subdivision, ramps: _FittedRamps) -> Curves:
     """Commands by which the tool is on the rounded path of the program, from before the vertex (there, where it is
     exact) to after the ramp."""
-    sides = np.where(np.stack([ramps.exact, ramps.exact & False], axis=1), 0.0, ramps.margin)
+    rounded = np.stack([~ramps.exact, np.ones(len(ramps.row), bool)], axis=1)
+    sides = np.where(rounded, ramps.margin, 0.0)
     on_ramp = np.ceil((PLACES - 1) * ramps.end / (ramps.end + sides.sum(axis=1)))
     step = ramps.end / on_ramp  # the curve turns where the ramp starts and ends: there are places
     before = np.floor((PLACES - 1 - on_ramp) * sides[:, 0] / sides.sum(axis=1))
@@ -263,10 +266,9 @@ def _curves(task: CompensationProblem, division: Subdivision, ramps: _FittedRamp
     ends = np.stack([first + np.minimum(away[0], -step), stop + np.maximum(away[1], step)], axis=1)
     for side, (motion, row) in enumerate(((before, ramps.row - 1), (ramps.after, ramps.row))):
         share = np.where(division.source[motion] == row, division.share[motion], 0.0)
-        arc = ramps.arc[:, side] & ~(ramps.exact if side == 0 else ramps.exact & False)
-        on_path = task.desired_path.length[row] * (share - (1.0 if side == 0 else 0.0))
-        nearest = first - NEAREST if side == 0 else stop + NEAREST
-        ends[:, side] = np.where(arc, (np.minimum, np.maximum)[side](on_path, nearest), ends[:, side])
+        on_path = task.desired_path.length[row] * (share if side else share - 1.0)
+        beyond = np.maximum(on_path, stop + NEAREST) if side else np.minimum(on_path, first - NEAREST)
+        ends[:, side] = np.where(ramps.arc[:, side] & rounded[:, side], beyond, ends[:, side])
     place, bent = (np.concatenate([far[0][:, None], a, far[1][:, None]], axis=1) for a in (place, bent))
     tangent = np.concatenate([tangent[:, :1], tangent, tangent[:, -1:]], axis=1)
     return Curves(first, step, ends, turn, place, tangent, ramps.arc, bent)
@@ -314,9 +316,11 @@ def _starts(ramps: _FittedRamps, curves: Curves, count: int) -> tuple[Floats, In
 
 def _exact_starts(ramps: _FittedRamps, curves: Curves, count: int) -> tuple[Floats, Ints]:
     """As ``_starts``, of ramps that start at an exact vertex: it stays where it is."""
-    steps: tuple[tuple[float, ...], ...] = {1: ((0.0,),), 2: ((0.0, 1.0), (-1.0, 0.0)), 3: ((-1.0, 0.0, 1.0),)}.get(
-        count, ()
-    )
+    steps: tuple[tuple[float, ...], ...] = {
+        1: ((0.0,),),
+        2: ((0.0, 1.0), (-1.0, 0.0)),
+        3: ((-1.0, 0.0, 1.0),),
+    }.get(count, ())
     starts = [_apart(ramps, curves, tuple((_E, k) for k in each), ramps.spacing) for each in steps]
     return np.array(starts), np.array([each.index(0.0) for each in steps], np.int64)
 

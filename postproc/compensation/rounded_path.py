@@ -164,8 +164,8 @@ class RoundedOutput:
 
     @cached_property
     def turns(self) -> Floats:
-        """(T, 2) rows and shares of the program's path near these motions where the force turns: where ramps of it start
-        or end, and where motions start, as it changes within them."""
+        """(T, 2) rows and shares of the program's path near these motions where the force turns: where ramps of it
+        start or end, and where motions start, as it changes within them."""
         if not len(self.motions):
             return np.empty((0, 2))
         rows = np.unique(self.segments.rows)

@@ -349,7 +349,8 @@ class _Solution:
         self._between(*(values[enclosed] for values in (active, below, above, one, two)))
 
     def _between(self, active: Ints, below: Floats, above: Floats, one: Floats, two: Floats) -> None:
-        """Places between those ``below``, of which the tools are ``one`` (K,) [m] ahead, and those ``above``: ``two``."""
+        """Places between those ``below``, of which the tools are ``one`` (K,) [m] ahead, and those ``above``:
+        ``two``."""
         side = np.zeros(len(active), np.int64)
         for _ in range(HALVINGS):
             if not len(active):

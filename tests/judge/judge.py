@@ -17,7 +17,7 @@ from .cell import Cell
 from .force import RULE, STRETCHED, Field
 from .motion import MM, Motion
 from .path import Path
-from .placing import BETWEEN, Tools, find_places, settle_places
+from .placing import BETWEEN, Tools, find_places, nearest_across_leaps, settle_places
 from .reader import read
 from .robot import Robot, check_on_mujoco, rotation_vectors, rotations
 
@@ -223,6 +223,7 @@ def _along(wanted: Path, cut: tuple, path: Path, rows: tuple, one: Field, nodes:
         order = np.argsort(label, kind="stable")
         label = label[order]
         place, lost = (np.concatenate(two)[order] for two in ((place, found[~gone]), (lost, gone[~gone])))
+        place = nearest_across_leaps(wanted, cut, one, label, place, lambda at: Tools(path, rows, at, nodes))
         tools = Tools(path, rows, label, nodes)
     motion, _ = path.find(label, *rows)
     wrench = one.at(place)

@@ -72,7 +72,8 @@ class MotionRows:
     """``chunks``: single rows and runs of common lines in their order; ``places``: rows by what is rare.
 
     ``passing``: points of spline blocks; ``entries``: first point of such a block -> line of its header.
-    ``sources_of``: rows that may start elsewhere than where the row before ends -> where.  ``stopped``: rows before which the advance run stops (2) or may (1);
+    ``sources_of``: rows that may start elsewhere than where the row before ends -> where.
+    ``stopped``: rows before which the advance run stops (2) or may (1);
     ``stopped_at_end``: the same of ends of routines: the count of rows, their sources, and 2 or 1.
     ``calls``: the count of rows, and after which ones a routine of another module moves the robot.
     ``left_from``: where routines end after which it is not known what runs.
