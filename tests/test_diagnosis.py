@@ -169,7 +169,7 @@ def test_what_only_absurd_sizes_imitate_stays_to_be_found():
     value = value + SIGMA * np.random.default_rng(6).normal(size=value.shape)
     campaign = Campaign(replace(empty.readings, value=value))
     base = fit(campaign, model, model_unknowns(model))
-    every = candidates(campaign, base.model, base.point.given)
+    every = candidates(campaign, base.model, base.point.nuisances)
     left = drop_confounded(campaign, base, replace(base.weights, shared=0.0), every)
     (sixth,) = [c for c in left if (c.name, c.joint) == ("link_geometry", "A6")]
     assert "dy6" in {u.parameter.name for u in sixth.unknowns}
@@ -267,7 +267,7 @@ def test_waves_of_all_gears_are_held_against_other_orders_in_all_of_them():
     base = fitted(campaign)
     whole_arm = [
         c
-        for c in candidates(campaign, base.model, base.point.given)
+        for c in candidates(campaign, base.model, base.point.nuisances)
         if (c.name, c.joint) == ("transmission_error", EVERY)
     ]
     assert whole_arm

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from test_corner_fit import FREE, square, two_sides
+from scipy.spatial.transform import Rotation
+from test_corner_fit import ALONG, FREE, square, two_sides
 
 from postproc.compensation.corner_fit import fit_corners
 from postproc.compensation.corners import rounded_errors
@@ -26,7 +29,9 @@ def bent(slope: float) -> Curves:
     place = np.stack([along, slope * np.clip(along, 0.0, END), np.zeros(len(along))], axis=1)
     tangent = np.broadcast_to([1.0, 0.0, 0.0], place.shape)
     ends, turn = np.array([[along[0], along[-1]]]), np.array([[0.0, END]])
-    return Curves(x[:1], x[1:2] - x[:1], ends, turn, place[None], tangent[None])
+    return Curves(
+        x[:1], x[1:2] - x[:1], ends, turn, place[None], tangent[None], np.zeros((1, 2), bool), place[None]
+    )
 
 
 def drawn_error(points: np.ndarray, slope: float, reach: float) -> float:
@@ -50,7 +55,7 @@ def drawn_error(points: np.ndarray, slope: float, reach: float) -> float:
 def fitted(slope: float, reach: float, *start: float) -> tuple[np.ndarray, float]:
     parameter = np.array([[-30.0 * MM, *start, 40.0 * MM]])
     shortest = np.full((1, parameter.shape[1] - 1), 0.3 * MM)
-    points, largest = fit_points(bent(slope), parameter, np.full(parameter.shape, reach), shortest, 0.0)
+    points, largest = fit_points(bent(slope), parameter, np.full(parameter.shape, reach), shortest, 0.0, 1)
     return points[0], float(largest[0])
 
 
@@ -77,6 +82,80 @@ def test_no_placing_of_two_points_is_better_than_the_fit(slope: float) -> None:
             least = min(least, drawn_error(np.array([ends[0], one, two, ends[1]]), slope, 1.0 * MM))
     assert largest < 1.02 * least
     assert largest > 0.9 * slope * 1.0 * MM / 8
+
+
+def test_points_that_start_too_near_to_each_other_are_moved_apart() -> None:
+    """Lines as short as they may be are no end of the search."""
+    _, alone = fitted(1.0, 2.0 * MM, 0.0, END)
+    points, largest = fitted(1.0, 2.0 * MM, -0.1 * MM, 0.0, 0.1 * MM, END - 0.1 * MM, END)
+    assert np.linalg.norm(np.diff(points, axis=0), axis=1).min() > 0.299 * MM
+    assert largest < 0.5 * alone
+
+
+def arc_and_line(is_arc: bool) -> Curves:
+    """Round a circle of 10 mm until (0, 0), along x from there on; over the last 0.3 mm before it and the first after
+    it on the parabola of the controller."""
+    step, reach = 0.02 * MM, 0.3 * MM
+    s = step * np.arange(-550, 551)
+
+    def along(at: np.ndarray) -> np.ndarray:
+        turn = np.minimum(at, 0.0) / (10.0 * MM)
+        round_ = 10.0 * MM * np.stack([np.cos(turn) - 1.0, np.sin(turn), 0.0 * turn], axis=-1)
+        return round_ + np.maximum(at, 0.0)[:, None] * [1.0, 0.0, 0.0]
+
+    def blended(at: np.ndarray) -> np.ndarray:
+        t = np.clip(0.5 + 0.5 * at / reach, 0.0, 1.0)[:, None]
+        inside = np.abs(at) < reach
+        parabola = (1.0 - t) * along(reach * (t[:, 0] - 1.0)) + t * along(reach * t[:, 0])
+        return np.where(inside[:, None], parabola, along(at))
+
+    ends = np.array([[-12.0 * MM, 30.0 * MM]])
+    on = np.concatenate([ends[0, :1], s, ends[0, 1:]])
+    place = blended(on)
+    tangent = np.gradient(place, axis=0)
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    arc = np.array([[is_arc, False]])
+    return Curves(s[:1], np.array([step]), ends, np.array([[0.0, 5.0 * MM]]), place[None], tangent[None], arc,
+                  along(on)[None])  # fmt: skip
+
+
+def test_points_on_an_arc_follow_it() -> None:
+    """A piece of an arc is no chord: the vertex and a point before it are where they are, and all of it fits."""
+    parameter = np.array([[-12.0, -3.0, 0.0, 5.0, 30.0]]) * MM
+    reach, shortest = np.array([[0.0, 0.0, 0.3, 0.3, 0.0]]) * MM, np.full((1, 4), 0.3 * MM)
+    found = []
+    for is_arc in (True, False):
+        curves = arc_and_line(is_arc)
+        start = curves.at(parameter)[0]
+        start[0, 2] = 0.0
+        points, largest = fit_points(curves, parameter, reach, shortest, 2e-6, 2)
+        found.append(float(largest[0]))
+        if is_arc:
+            assert np.abs(points - start).max() < 0.2 * MM
+    assert found[0] < 5e-6
+    assert found[1] > 50e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turn", [np.pi / 2, -np.pi / 2])
+def test_what_no_points_hold_is_as_near_as_can_be(turn: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The points on the ramp are taken where they come nearer than those of the corner alone, else these."""
+    turned = Rotation.from_rotvec([0.0, 0.0, turn]).apply(ALONG)
+    job = replace(two_sides(0.5 * MM, turn, turned), tolerance=2e-6)
+    limits = replace(FREE, ramp_end=0.6 * MM)
+    result = correct(job)
+    plain = subdivide(job, result, limits)
+    errors = []
+    for fitted_ramps in (True, False):
+        if not fitted_ramps:
+            monkeypatch.setattr(
+                "postproc.compensation.corner_fit.choose_ramp_points",
+                lambda task, result, division, *_: (division, None, np.empty(0, np.int64)),
+            )
+        fit, division = fit_corners(job, result, plain, limits)
+        errors.append(rounded_errors(job, fit, division)[1].max())
+    assert errors[0] > job.tolerance
+    assert errors[0] <= errors[1]
 
 
 def test_more_points_are_needed_only_for_more() -> None:

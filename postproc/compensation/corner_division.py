@@ -130,7 +130,11 @@ def with_corners(
     poses.put(there, division.command[corner[there]])
     new = np.flatnonzero(inner)
     poses.put(new, commands_on_rounded_path(task, row[new], share[new]))
-    if chosen.own_place is not None and chosen.place is not None:
+    begun = poses
+    if chosen.own_place is not None and chosen.place is not None:  # arcs bend as on the path itself
+        begun = poses.copy()
+        begun.put(there, division.command[corner[there]])
+        begun.put(added, commands_on_path(task, row[added], share[added]))
         poses.position[:] = np.concatenate([chosen.own_place[numbers], chosen.place[inserted]])[order]
     arcs = [np.insert(a, before, np.nan, axis=0) for a in (division.centre, division.normal, division.sweep)]
     made = Subdivision(
@@ -152,7 +156,7 @@ def with_corners(
     curved = _arcs_of(task, made, motion)
     via = _on_path(task, made, curved)
     start = np.searchsorted(group, np.arange(len(used) + 1))  # corners follow each other
-    base = _overlaid(made.command, motion, poses)
+    base = _overlaid(made.command, motion, begun)
     found = CornerDivision(made, base, motion, row, group, start, poses, curved, via)
     return found.moved(task, poses if fitted is None else fitted.poses[np.flatnonzero(used[fitted.group])])
 
@@ -184,6 +188,13 @@ def commands_on_rounded_path(task: CompensationProblem, row: Ints, share: Floats
     return task.command(row, wanted, task.force.along(row, share), goal, share=share).command
 
 
+def commands_on_path(task: CompensationProblem, row: Ints, share: Floats) -> Poses:
+    """The same on the path that rounds off nothing."""
+    wanted = task.desired_path.at(row, share)
+    goal = task.goal(row, wanted, share)
+    return task.command(row, wanted, task.force.along(row, share), goal, share=share).command
+
+
 def _arcs_of(task: CompensationProblem, division: Subdivision, motion: Ints) -> Ints:
     """Arcs among the motions that start or end in the points of ``motion`` (P,), ascending."""
     near = np.unique(np.concatenate([motion, motion + 1]))
@@ -196,7 +207,4 @@ def _on_path(task: CompensationProblem, division: Subdivision, motions: Ints) ->
     last = division.share[motions]
     before = np.maximum(motions - 1, 0)
     first = np.where((division.source[before] == row) & (motions > 0), division.share[before], 0.0)
-    share = 0.5 * (first + last)
-    wanted = task.desired_path.at(row, share)
-    goal = task.goal(row, wanted, share)
-    return task.command(row, wanted, task.force.along(row, share), goal, share=share).command
+    return commands_on_path(task, row, 0.5 * (first + last))

@@ -9,13 +9,14 @@ evaluated again.  Where the point alone is not enough, others are inserted besid
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import blocks, in_blocks
 from postproc.base.geometry import Poses, lengths, product, rotation_from_vector
+from postproc.base.units import MM
 from postproc.compensation.approximations import approximations, as_stated, stated_alone
 from postproc.compensation.corner_division import CornerDivision, with_corners
 from postproc.compensation.corner_points import PointChooser
@@ -23,7 +24,7 @@ from postproc.compensation.corners import compare_corners_at, evaluate_corners, 
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.ramp_points import NEVER, LeastPoints, choose_ramp_points
-from postproc.compensation.rounded_path import Blend, RoundedOutput
+from postproc.compensation.rounded_path import Blend, Deviations, RoundedOutput
 from postproc.compensation.subdivision import Limits, Subdivision
 from postproc.toolpath import Role
 
@@ -39,6 +40,12 @@ further ones), and with which their points are fitted to a curve, which is a lit
 
 BETTER = 0.9
 """A fitted corner that keeps more of its error stays as it was."""
+
+BEHIND = 1.0 * MM
+"""[m] As far behind the end of a ramp its error is looked for."""
+
+AS_WRITTEN = 1.05
+"""By this factor a fit may be worse once its digits are written."""
 
 RIDGE = 1e-3
 """Share of the weights that keeps a point that hardly shows where it is."""
@@ -59,7 +66,61 @@ def fit_corners(
     least = {} if least is None else least
     if task.gain != 1.0:
         return result, division
-    result, division = _fit_ramps(task, result, division, limits, least)
+    *plain, rows = _fit_all(task, result, division, limits, least, np.empty(0, np.int64))
+    if not len(rows):
+        return plain[0], plain[1]
+    # what no points hold: those that come nearest to the ramps, or those of the corners alone
+    before = _near_ramps(task, plain[1], rows)
+    for _ in range(2):
+        *other, _ = _fit_all(task, result, division, limits, least, rows)
+        better = _near_ramps(task, other[1], rows) < BETTER * before
+        if better.all():
+            return other[0], other[1]
+        if not better.any():
+            break
+        rows, before = rows[better], before[better]
+    return plain[0], plain[1]
+
+
+def _near_ramps(task: CompensationProblem, division: Subdivision, rows: Ints) -> Floats:
+    """(L,) errors, in parts of the allowed one, beside the vertices where ``rows`` (L,) start and on their ramps."""
+    found = np.zeros(len(rows))
+    ramps = task.force.ramps
+    if ramps is None:
+        return found
+    run = as_stated(task, division)
+    length = task.desired_path.length
+    end = ramps.length[np.searchsorted(ramps.row, rows)]
+    for k, row in enumerate(rows.tolist()):
+        first, vertex, last = np.searchsorted(division.source, [row - 1, row, row + 1])
+        on_row = int(np.searchsorted(division.share[vertex:last] * length[row], end[k] + BEHIND))
+        motions = np.arange(max(first, vertex - 3), min(vertex + on_row + 1, last))
+        found[k] = _size(task, *RoundedOutput(*run, motions).largest(motions)).max()
+    return found
+
+
+def _fit_all(
+    task: CompensationProblem,
+    result: CorrectionResult,
+    division: Subdivision,
+    limits: Limits,
+    least: LeastPoints,
+    anyhow: Ints,
+) -> tuple[CorrectionResult, Subdivision, Ints]:
+    """The result and the division with fitted ramps and corners, and the rows (L,) of the ramps that are left, but for
+    those ``anyhow`` (A,)."""
+    result, division, rows = _fit_ramps(task, result, division, limits, least, anyhow)
+    return *_fit_alone(task, result, division, limits, least), rows
+
+
+def _fit_alone(
+    task: CompensationProblem,
+    result: CorrectionResult,
+    division: Subdivision,
+    limits: Limits,
+    least: LeastPoints,
+) -> tuple[CorrectionResult, Subdivision]:
+    """The same with the corners that are on no fitted ramp."""
     if np.isnan(task.toolpath.approximation).all():
         return result, division
     motion = find_corners(task, result, division)
@@ -102,22 +163,33 @@ def _fit_ramps(
     division: Subdivision,
     limits: Limits,
     least: LeastPoints,
-) -> tuple[CorrectionResult, Subdivision]:
-    """The same with the points on ramps of the force, as few as hold the tolerance."""
+    anyhow: Ints,
+) -> tuple[CorrectionResult, Subdivision, Ints]:
+    """The same with the points on ramps of the force, as few as hold the tolerance, and the rows (L,) of those left,
+    but for ``anyhow`` (A,)."""
     least = dict(least)
     while True:
-        part, chosen = choose_ramp_points(task, result, division, limits, least, FITTED * task.tolerance)
+        part, chosen, left = choose_ramp_points(
+            task, result, division, limits, least, FITTED * task.tolerance, anyhow
+        )
         if chosen is None:
-            return result, division
+            return result, division, left
         chosen = replace(chosen, before=np.full(len(chosen.corner), 1.0 / ALLOWED))
         fitted = with_corners(task, result, part, chosen, np.ones(len(chosen.corner), bool))
         enough = ON_RAMPS / ALLOWED
         stated = stated_alone(task)
         fitted, _ = _fitted(stated, fitted, enough)
         after = _largest(stated, fitted)
-        bad = ~(after <= enough)
+        at_vertex = part.share[chosen.corner] == 1.0  # else where the ramp ends
+        taken = np.isin(part.source[chosen.corner] + at_vertex, anyhow)
+        bad = ~(after <= enough) & ~taken
         if not bad.any():
-            return fitted.result(task, result), fitted.division
+            fits = fitted.division.fits
+            assert fits is not None
+            before = np.where(taken, np.maximum(1.0 / ALLOWED, AS_WRITTEN * after), 1.0 / ALLOWED)
+            before = before[fitted.group]
+            division = replace(fitted.division, fits=replace(fits, before=before))
+            return fitted.result(task, result), division, left
         least |= _more_points(fitted.division, bad[fitted.group])
 
 
@@ -227,6 +299,7 @@ def _evaluate(
     output = RoundedOutput(task, fitted.division, np.unique(np.concatenate([motions, motions + 1])))
     samples = _samples(fitted, output, part)
     found = output.deviations(samples.at, samples.share)
+    samples, found = _with_turns(samples, output, found)
     off, angle = lengths(found.shift), lengths(found.turn)
     largest = np.zeros(part.stop - part.start)
     np.maximum.at(largest, samples.group - part.start, _size(task, off, angle))
@@ -256,6 +329,24 @@ def _samples(fitted: CornerDivision, output: RoundedOutput, part: slice) -> _Cor
     share = np.minimum(share, np.where(last, after, 1.0)[:, None])
     many = share.shape[1]
     return _CornerSamples(np.repeat(group, many), np.repeat(at, many), share.ravel(), len(at))
+
+
+def _with_turns(
+    samples: _CornerSamples, output: RoundedOutput, found: Deviations
+) -> tuple[_CornerSamples, Deviations]:
+    """The same with the places where the force turns, and what is ``found`` (S) there: the error has a peak there."""
+    owner, at, share = samples.by_segment
+    nearer = list(output.where_force_turns(at, share, found))
+    if not nearer:
+        return samples, found
+    which, segment, between, there = nearer[-1]
+    group = np.concatenate([samples.group, owner[which]])
+    order = np.argsort(group, kind="stable")
+    more = (np.concatenate([samples.at, segment])[order], np.concatenate([samples.share, between])[order])
+    both = (
+        np.concatenate([getattr(one, f.name) for one in (found, there)])[order] for f in fields(Deviations)
+    )
+    return _CornerSamples(group[order], *more, samples.segments), Deviations(*both)
 
 
 def _weights(fitted: CornerDivision, output: RoundedOutput, samples: _CornerSamples, part: slice) -> Floats:

@@ -141,10 +141,22 @@ class PointChooser:
         least = self._spacing(row)
         if np.isfinite(segments.sweep[at]):
             radius = float(self.output.extent[at] / abs(segments.sweep[at]))
-            least = max(least, float(np.sqrt(8.0 * radius * SAGITTA * self.task.tolerance)))
+            least = max(least, float(_with_sagitta(radius, self.task.tolerance)))
         room = (last - first) * length - float(self.taken[later, at])
         return least, room if self.free[row] else 0.0, row, first if later else last, length
 
     def _spacing(self, row: int) -> float:
         feed = float(np.nan_to_num(self.task.toolpath.feed[row]))
         return max(self.limits.ramp_end, feed * self.limits.cycle)
+
+
+def shortest_arc(task: CompensationProblem, rows: Ints) -> Floats:
+    """(K,) [m] the shortest pieces of the arcs ``rows`` (K,)."""
+    centre = task.desired_path.circles(rows)[0]
+    radius = lengths(task.desired_path.at(rows, np.zeros(len(rows))).position - centre)
+    return np.asarray(_with_sagitta(radius, task.tolerance))
+
+
+def _with_sagitta(radius: Floats | float, tolerance: float) -> Floats:
+    """(...) [m] the shortest arcs that are told from their chords."""
+    return np.asarray(np.sqrt(8.0 * SAGITTA * tolerance * np.asarray(radius)))

@@ -5,6 +5,9 @@ of the inner points are free: across the curve they take away what is off; along
 and, as a parabola reaches no farther than half of the shorter line beside it, how closely.  The largest distance across
 the curve is made least by Gauss-Newton steps, damped and of limited length (Levenberg 1944), each the least largest
 error of the linear problem by raised weights (Lawson 1961).
+
+Beside a vertex the motions may be arcs: a piece of one is the line between its points, and what the arc of the commands
+bends away from such a line, which moves with its points.
 """
 
 from __future__ import annotations
@@ -21,6 +24,9 @@ STEPS, WEIGHINGS, SECANTS = 24, 8, 4
 
 FIRST, SHORTEST, LONGEST = 5e-4, 2e-6, 2e-3
 """[m] Length of a step: at first; where the search ends; at most."""
+
+SPREADS, TOO_SHORT = 12, 1e-7
+"""How often lines that are too short are made longer after a step, and by how much [m] they may be too short then."""
 
 ON_PARABOLA, ON_LINE = np.linspace(0.0, 1.0, 25), 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 21))
 """Where parabolas and lines are evaluated: lines closer near their ends, where curves turn."""
@@ -39,7 +45,8 @@ class Curves:
 
     first, step (G,) [m]: of the parameters; ends (G, 2) [m]: parameters of the points before and after; turn (G, T)
     [m]: at which the curve turns, ascending; place (G, N + 2, 3) [m]; tangent (G, N + 2, 3): unit vectors, square to
-    which the distance is measured (where the tool is early or late nothing is off).
+    which the distance is measured (where the tool is early or late nothing is off).  arc (G, 2): the motions before and
+    after the vertex, at 0, are; bent (G, N + 2, 3) [m]: the places as they are where no vertex is rounded off.
     """
 
     first: Floats
@@ -48,6 +55,8 @@ class Curves:
     turn: Floats
     place: Floats
     tangent: Floats
+    arc: Bools
+    bent: Floats
 
     def __getitem__(self, chosen: Ints | Bools) -> Curves:
         return Curves(*(getattr(self, each.name)[chosen] for each in fields(self)))
@@ -62,8 +71,42 @@ class Curves:
             )
         return parameter
 
+    def away(self, start: Floats, first: Floats, distance: Floats, way: int) -> Floats:
+        """(G,) [m] parameters of the places from ``first`` (G,) [m] on, ahead (``way`` 1) or back (-1), that are
+        ``distance`` (G,) [m] or more from those with the parameters ``start`` (G,) [m]; ``first`` where none is."""
+        count = self.place.shape[1] - 2
+        parameter = self.first[:, None] + self.step[:, None] * np.arange(count)
+        gap = _sizes(self.place[:, 1:-1] - self.at(start[:, None])[0])
+        good = (gap >= distance[:, None]) & (way * (parameter - first[:, None]) >= 0.0)
+        nearest = np.min(np.where(good, way * parameter, np.inf), axis=1)
+        here = _sizes((self.at(first[:, None])[0] - self.at(start[:, None])[0])[:, 0])
+        return np.where(np.isfinite(nearest) & (here < distance), way * nearest, first)
+
     def at(self, parameter: Floats) -> tuple[Floats, Floats, Floats]:
         """Places, tangents and derivatives (G, S, 3) of the places at parameters (G, S)."""
+        low, part, size = self._number(parameter)
+        one = np.arange(len(low))[:, None]
+        here, there = self.place[one, low], self.place[one, low + 1]
+        tangent = self.tangent[one, low] * (1.0 - part) + self.tangent[one, low + 1] * part
+        return here + part * (there - here), tangent, (there - here) / size
+
+    def bends(self, low: Floats, high: Floats, share: Floats, side: int) -> Floats:
+        """(G, S, 3) [m] by how much the arcs from the parameters ``low`` (G,) to ``high`` (G,), before the vertex
+        (``side`` 0) or after it, are off the lines between their ends, at the shares (G, S); 0 of lines."""
+        ends = np.stack([low, high], axis=1)
+        parameter = low[:, None] + share * (high - low)[:, None]
+        found, last = self._bent(parameter), self._bent(ends)
+        found -= last[:, :1] + share[..., None] * (last[:, 1:] - last[:, :1])
+        return np.where(self.arc[:, side, None, None], found, 0.0)
+
+    def _bent(self, parameter: Floats) -> Floats:
+        low, part, _ = self._number(parameter)
+        one = np.arange(len(low))[:, None]
+        return np.asarray(self.bent[one, low] * (1.0 - part) + self.bent[one, low + 1] * part)
+
+    def _number(self, parameter: Floats) -> tuple[Ints, Floats, Floats]:
+        """(G, S) numbers of the places before parameters (G, S), (G, S, 1) the parts of the way to the next, and
+        (G, S, 1) [m] of how long a way."""
         last = self.place.shape[1] - 2  # of the curve itself
         first, step, ends = self.first[:, None], self.step[:, None], self.ends
         stop = first + (last - 1) * step
@@ -73,23 +116,21 @@ class Curves:
         number = np.where(after, last + (parameter - stop) / (ends[:, 1:] - stop), number)
         number = np.clip(number, 0.0, last + 0.999)
         low = number.astype(np.int64)
-        part = (number - low)[..., None]
-        one = np.arange(len(low))[:, None]
-        here, there = self.place[one, low], self.place[one, low + 1]
-        tangent = self.tangent[one, low] * (1.0 - part) + self.tangent[one, low + 1] * part
         size = np.where(low == 0, first - ends[:, :1], np.where(low == last, ends[:, 1:] - stop, step))
-        return here + part * (there - here), tangent, (there - here) / size[..., None]
+        return low, (number - low)[..., None], size[..., None]
 
 
 @dataclass
 class _Polygons:
     """Polygons of K points (G, K, 3) with S places on them: off (G, S, 3) across the curves, slope (G, S, 3, V): by how
-    much the V coordinates of the inner points change it, parameter (G, S) of the nearest places of the curves."""
+    much the V coordinates of the inner points change it, parameter (G, S) of the nearest places of the curves; label
+    (G, K): parameters of the points."""
 
     points: Floats
     off: Floats
     slope: Floats
     parameter: Floats
+    label: Floats
 
     @property
     def largest(self) -> Floats:
@@ -98,16 +139,17 @@ class _Polygons:
 
 
 def fit_points(
-    curves: Curves, parameter: Floats, reach: Floats, shortest: Floats, enough: float
+    curves: Curves, parameter: Floats, reach: Floats, shortest: Floats, enough: float, vertex: int
 ) -> tuple[Floats, Floats]:
     """Points (G, K, 3) of polygons along G ``curves``, and the largest distance (G,) [m] of each from its curve.
 
     parameter (G, K) [m]: where the points start, on the curves; the first and the last stay.  reach (G, K) [m]: from
     where on points are rounded off; shortest (G, K - 1) [m]: lines.  enough [m]: a distance that needs no improvement.
+    vertex: which of the points is that between the motions.
     """
-    points = curves.at(parameter)[0]
-    best = _evaluate(curves, points, reach, None, parameter)
-    largest = best.largest
+    points = _apart(curves.at(parameter)[0], shortest)
+    best = _evaluate(curves, points, reach, None, parameter, vertex)
+    largest = np.where(_long_enough(points, shortest), best.largest, np.inf)
     trust, damping = np.full(len(points), FIRST), np.full(len(points), 1e-2)
     for _ in range(STEPS):
         some = np.flatnonzero((largest > enough) & (trust > SHORTEST))
@@ -117,13 +159,13 @@ def fit_points(
         step = _least_largest(off, slope, damping[some]).reshape(len(some), -1, 3)
         step *= np.minimum(1.0, trust[some] / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-15))[:, None, None]
         moved = best.points[some]
-        factor = _possible(moved, step, shortest[some])
-        moved[:, 1:-1] += factor[:, None, None] * step
-        found = _evaluate(curves[some], moved, reach[some], best.parameter[some], None)
-        after = found.largest
+        moved[:, 1:-1] += step
+        moved = _apart(moved, shortest[some])
+        found = _evaluate(curves[some], moved, reach[some], best.parameter[some], best.label[some], vertex)
+        after = np.where(_long_enough(moved, shortest[some]), found.largest, np.inf)
         won = after < largest[some]
         at = some[won]
-        for name in ("points", "off", "slope", "parameter"):
+        for name in ("points", "off", "slope", "parameter", "label"):
             getattr(best, name)[at] = getattr(found, name)[won]
         largest[at] = after[won]
         damping[some] = np.where(won, np.maximum(0.4 * damping[some], 1e-4), 6.0 * damping[some])
@@ -136,15 +178,28 @@ def _sizes(vectors: Floats) -> Floats:
     return np.asarray(np.sqrt(np.sum(vectors * vectors, axis=-1)))
 
 
-def _possible(points: Floats, step: Floats, shortest: Floats) -> Floats:
-    """(G,) shares of the steps (G, K - 2, 3) with which no line is too short, 0 where there is none."""
-    factor = np.zeros(len(points))
-    for share in (0.1, 0.25, 0.5, 1.0):
-        moved = points.copy()
-        moved[:, 1:-1] += share * step
-        good = (_sizes(np.diff(moved, axis=1)) >= shortest).all(axis=1)
-        factor = np.where(good, share, factor)
-    return factor
+def _long_enough(points: Floats, shortest: Floats) -> Bools:
+    """(G,) whether no line of the points (G, K, 3) is shorter than ``shortest`` (G, K - 1) [m]."""
+    return np.asarray((_sizes(np.diff(points, axis=1)) >= shortest - TOO_SHORT).all(axis=1))
+
+
+def _apart(points: Floats, shortest: Floats) -> Floats:
+    """The points (G, K, 3) with the inner ones moved so far apart that lines are ``shortest`` (G, K - 1) [m] or longer;
+    some are shorter still where there is no room."""
+    inner = np.ones(points.shape[1])
+    inner[[0, -1]] = 0.0
+    share = inner[1:] / np.maximum(inner[1:] + inner[:-1], 1.0)
+    for _ in range(SPREADS):
+        step = np.diff(points, axis=1)
+        size = _sizes(step)
+        lack = np.maximum(shortest - size, 0.0)
+        if not lack.any():
+            break
+        push = (lack / np.maximum(size, 1e-12))[..., None] * step
+        points = points.copy()
+        points[:, 1:] += share[:, None] * push
+        points[:, :-1] -= (inner[:-1] * (1.0 - share))[:, None] * push
+    return points
 
 
 def _least_largest(off: Floats, slope: Floats, damping: Floats) -> Floats:
@@ -168,18 +223,19 @@ def _least_largest(off: Floats, slope: Floats, damping: Floats) -> Floats:
 
 
 def _evaluate(
-    curves: Curves, points: Floats, reach: Floats, near: Floats | None, parameter: Floats | None
+    curves: Curves, points: Floats, reach: Floats, near: Floats | None, label: Floats, vertex: int
 ) -> _Polygons:
     """The polygons (G, K, 3) against their curves; the nearest places are looked for from ``near`` (G, S), or from
-    where the points have ``parameter`` (G, K)."""
-    weights, slope = _weights(points, reach)
-    place = weights @ points
-    if near is None and parameter is not None:
-        near = (weights @ parameter[..., None])[..., 0]
-    at = curves.nearest(place, np.asarray(near)[:, : place.shape[1]], SECANTS if parameter is not None else 2)
+    where the points have the parameters ``label`` (G, K)."""
+    label = _labels(curves, points, label, vertex)
+    weights, slope, bend = _weights(curves, points, reach, label, vertex)
+    place = weights @ points + bend
+    secants = 2 if near is not None else SECANTS
+    near = (weights @ label[..., None])[..., 0] if near is None else near[:, : place.shape[1]]
+    at = curves.nearest(place, near, secants)
     more, factors = _turns(curves, at)
-    weights, slope = (_with_turns(values, more, factors) for values in (weights, slope))
-    place = weights @ points
+    weights, slope, bend = (_with_turns(values, more, factors) for values in (weights, slope, bend))
+    place = weights @ points + bend
     at = curves.nearest(place, _with_turns(at, more, factors), 1)
     here, tangent, along = curves.at(at)
     off = place - here
@@ -187,7 +243,23 @@ def _evaluate(
     # where a place moves, that of the curve follows: (place - here) stays square to the tangent
     ahead = along / np.maximum(np.sum(along * tangent, axis=2), FLATTEST)[..., None]
     slope = slope - ahead[..., None] * np.einsum("gsi,gsiv->gsv", tangent, slope)[:, :, None, :]
-    return _Polygons(points, off, slope, at)
+    return _Polygons(points, off, slope, at, label)
+
+
+def _labels(curves: Curves, points: Floats, label: Floats, vertex: int) -> Floats:
+    """(G, K) parameters of points (G, K, 3), looked for from ``label`` (G, K), ascending; those of the ends and of the
+    vertex stay."""
+    if not curves.arc.any():
+        return label
+    fixed = label.copy()
+    fixed[:, vertex] = 0.0
+    inner = np.arange(1, points.shape[1] - 1)
+    inner = inner[inner != vertex]
+    fixed[:, inner] = curves.nearest(points[:, inner], label[:, inner])
+    before, after = fixed[:, : vertex + 1], fixed[:, vertex:]
+    fixed[:, : vertex + 1] = np.minimum.accumulate(before[:, ::-1], axis=1)[:, ::-1]
+    fixed[:, vertex:] = np.maximum.accumulate(after, axis=1)
+    return np.clip(fixed, label[:, :1], label[:, -1:])
 
 
 def _turns(curves: Curves, at: Floats) -> tuple[Ints, Floats]:
@@ -209,9 +281,12 @@ def _with_turns(values: Floats, number: Ints, part: Floats) -> Floats:
     return np.concatenate([values, between], axis=1)
 
 
-def _weights(points: Floats, reach: Floats) -> tuple[Floats, Floats]:
-    """(G, S, K): places of the rounded polygons as parts of their points (G, K, 3), and (G, S, 3, V) by how much the
-    coordinates of the inner points change them, what they do to the reach of the parabolas included."""
+def _weights(
+    curves: Curves, points: Floats, reach: Floats, label: Floats, vertex: int
+) -> tuple[Floats, Floats, Floats]:
+    """(G, S, K): places of the rounded polygons as parts of their points (G, K, 3), (G, S, 3, V) by how much the
+    coordinates of the inner points change them, what they do to the reach of the parabolas included, and (G, S, 3) [m]
+    what arcs between points with the parameters ``label`` (G, K) add."""
     groups, count, _ = points.shape
     step = np.diff(points, axis=1)
     length = np.maximum(_sizes(step), 1e-9)
@@ -227,12 +302,18 @@ def _weights(points: Floats, reach: Floats) -> tuple[Floats, Floats]:
         round_[:, i] = np.minimum(reach[:, i], half)
         limited = (half < reach[:, i])[:, None, None]
         change_round[:, i] = np.where(limited, 0.5 * change[np.arange(groups), shorter], 0.0)
-    parts, slopes = [], []
+    parts, slopes, bends = [], [], []
 
-    def add(part: Floats, more: Floats | None) -> None:
+    def add(part: Floats, more: Floats | None, bend: Floats) -> None:
         slope = part[:, :, None, :, None] * np.eye(3)[None, None, :, None, :]
         parts.append(part)
         slopes.append(slope if more is None else slope + more)
+        bends.append(bend)
+
+    def bent(i: int, share: Floats) -> Floats:
+        if not curves.arc.any():
+            return np.zeros((*share.shape, 3))
+        return curves.bends(label[:, i], label[:, i + 1], share, 0 if i < vertex else 1)
 
     def line(i: int) -> None:
         low, high = round_[:, i] / length[:, i], 1.0 - round_[:, i + 1] / length[:, i]
@@ -242,7 +323,7 @@ def _weights(points: Floats, reach: Floats) -> tuple[Floats, Floats]:
             share = low[:, None] + away if i else (high[:, None] - away)[:, ::-1]
         part = np.zeros((groups, share.shape[1], count))
         part[:, :, i], part[:, :, i + 1] = 1.0 - share, share
-        add(part, None)
+        add(part, None, bent(i, share))
 
     u = ON_PARABOLA
     line(0)
@@ -252,12 +333,17 @@ def _weights(points: Floats, reach: Floats) -> tuple[Floats, Floats]:
         first, last = (1.0 - u) ** 2 * shares[0][:, None], u**2 * shares[1][:, None]
         part[:, :, i - 1], part[:, :, i + 1], part[:, :, i] = first, last, 1.0 - first - last
         more = np.zeros((groups, len(u), 3, count, 3))
-        for k, bend in ((0, (1.0 - u) ** 2), (1, u**2)):
+        for k, curve in ((0, (1.0 - u) ** 2), (1, u**2)):
             of_share = change_round[:, i] - shares[k][:, None, None] * change[:, i - 1 + k]
             of_share = of_share / length[:, i - 1 + k][:, None, None]
-            toward = bend[None, :, None] * (step[:, i] if k else -step[:, i - 1])[:, None, :]
+            toward = curve[None, :, None] * (step[:, i] if k else -step[:, i - 1])[:, None, :]
             more += toward[:, :, :, None, None] * of_share[:, None, None]
-        add(part, more)
+        before = (1.0 - u)[:, None] * bent(i - 1, 1.0 - shares[0][:, None] * (1.0 - u))
+        add(part, more, before + u[:, None] * bent(i, shares[1][:, None] * u))
         line(i)
     slope = np.concatenate(slopes, axis=1)[:, :, :, 1:-1]
-    return np.concatenate(parts, axis=1), slope.reshape(*slope.shape[:3], -1)
+    return (
+        np.concatenate(parts, axis=1),
+        slope.reshape(*slope.shape[:3], -1),
+        np.concatenate(bends, axis=1),
+    )

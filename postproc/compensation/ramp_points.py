@@ -16,8 +16,8 @@ from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.geometry import PoseRows, lengths
 from postproc.base.units import MM
 from postproc.compensation.approximations import approximations
-from postproc.compensation.corner_division import commands_on_rounded_path
-from postproc.compensation.corner_points import ChosenPoints
+from postproc.compensation.corner_division import commands_on_path, commands_on_rounded_path
+from postproc.compensation.corner_points import ChosenPoints, shortest_arc
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.point_fit import Curves, fit_points
 from postproc.compensation.problem import CompensationProblem
@@ -38,11 +38,20 @@ LeastPoints = Mapping[tuple[int, float], int]
 MARGIN = 3.0 * MM
 """[m] The curve goes on before the vertex and after the ramp by this, and twice the approximation."""
 
+ON_ARC = 12.0 * MM
+"""[m] The same on an arc: as far as the polygon is compared with it."""
+
+NEAREST = 1e-9
+"""[m] The next point of an arc is by so much at least beyond the curve."""
+
 PLACES = 440
 """Places of a curve."""
 
 ENOUGH = 0.85
 """Share of the allowed error with which a fit ends."""
+
+PAYS = 0.9
+"""Share of the error that is left which a fit with more points has to come below."""
 
 SHOWS = 0.9
 """Share of the tolerance: ramps whose ends are rounded off by less keep the one point that they have."""
@@ -55,8 +64,9 @@ APART = 0.1
 class _FittedRamps:
     """G ramps.  vertex, knot (G,): the motions of the division that end where the ramp starts and where it ends; row
     (G,): of the program, with the ramp; end [m] (G,): its length; exact (G,): the vertex is; reach (G, 2) [m]: from
-    where on points before and after the vertex are rounded off; spacing (G,) [m]: the shortest motion; margin (G,)
-    [m]: as far the curve goes on; after (G,): the motion that ends in the next point after those of the ramp."""
+    where on points before and after the vertex are rounded off; spacing (G, 2) [m]: the shortest motion before and
+    after the vertex; margin (G, 2) [m]: as far the curve goes on before and after; after (G,): the motion that ends in
+    the next point after those of the ramp; arc (G, 2): the motions before and after the vertex are."""
 
     vertex: Ints
     knot: Ints
@@ -67,6 +77,7 @@ class _FittedRamps:
     spacing: Floats
     margin: Floats
     after: Ints
+    arc: Bools
 
     def __getitem__(self, chosen: Ints | Bools) -> _FittedRamps:
         return _FittedRamps(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
@@ -74,12 +85,13 @@ class _FittedRamps:
 
 @dataclass(frozen=True)
 class _FittedPoints:
-    """Points of one ramp: places (n, 3), path lengths (n,) [m] from the vertex, and which of them is the motion that is
-    there already."""
+    """Points of one ramp: places (n, 3), path lengths (n,) [m] from the vertex, which of them is the motion that is
+    there already, and the largest error [m]."""
 
     place: Floats
     along: Floats
     own: int
+    largest: float
 
 
 def choose_ramp_points(
@@ -89,21 +101,31 @@ def choose_ramp_points(
     limits: Limits,
     least: LeastPoints,
     allowed: float,
-) -> tuple[Subdivision, ChosenPoints | None]:
-    """The division without the points of those ramps for which others were found, and these.  allowed [m]: error."""
+    anyhow: Ints,
+) -> tuple[Subdivision, ChosenPoints | None, Ints]:
+    """The division without the points of those ramps for which others were found, these, and the rows (L,) of the ramps
+    left.  allowed [m]: error; for ramps of the rows ``anyhow`` (A,) what comes nearest will do where nothing holds it.
+    """
     ramps, inner, fewest = _ramps(task, result, division, limits, least)
     if not len(ramps.row):
-        return division, None
+        return division, None, np.empty(0, np.int64)
     curves = _curves(task, division, ramps)
     spare = limits.inserted(len(task.toolpath)) - division.inserted
     found: dict[int, _FittedPoints] = {}
+    nearest: dict[int, _FittedPoints] = {}
     left = np.arange(len(ramps.row))
     for count in range(1, len(_STARTS) + 1):
         some = left[(fewest[left] <= count) & (count <= inner[left] + spare)]
-        if len(some):
-            found |= _fitted(ramps[some], curves[some], count, allowed, some)
+        for name, one in _fitted(ramps[some], curves[some], count, allowed, some).items():
+            if one.largest <= allowed:
+                found[name] = one
+            elif name not in nearest or one.largest < PAYS * nearest[name].largest:
+                nearest[name] = one
         left = np.array([k for k in left if k not in found], np.int64)
-    return _without_points(task, division, ramps, found)
+    wanted = np.isin(ramps.row, anyhow).tolist()
+    found |= {name: one for name, one in nearest.items() if name not in found and wanted[name]}
+    part, chosen = _without_points(task, division, ramps, found)
+    return part, chosen, ramps.row[[k for k in left if k not in found]]
 
 
 def _ramps(
@@ -113,15 +135,24 @@ def _ramps(
     limits: Limits,
     least: LeastPoints,
 ) -> tuple[_FittedRamps, Ints, Ints]:
-    """The ramps of straight motions that end in an inserted point, alone and away from others; and (G,) how many points
-    are inserted for each, and have to be at least."""
+    """The ramps that end in an inserted point of their motion, alone and away from others; and (G,) how many points are
+    inserted for each, and have to be at least."""
     none = np.empty(0, np.int64)
     parts, path, desired_path = task.force.ramps, task.toolpath, task.desired_path
     inserted = np.flatnonzero((division.role == Role.INTERMEDIATE) & (division.share < 1.0))
     if parts is None or not len(inserted) or limits.no_insert:
         return (
             _FittedRamps(
-                none, none, none, np.empty(0), none > 0, np.empty((0, 2)), np.empty(0), np.empty(0), none
+                none,
+                none,
+                none,
+                np.empty(0),
+                none > 0,
+                np.empty((0, 2)),
+                np.empty((0, 2)),
+                np.empty((0, 2)),
+                none,
+                np.empty((0, 2), bool),
             ),
             none,
             none,
@@ -132,13 +163,7 @@ def _ramps(
     good = (many == 1) & (parts.start[at] <= 0.0) & (end < parts.extent[at]) & ~parts.before[at]
     row, end = row[good], end[good]
     before = row - 1
-    on = (
-        result.corrected
-        & desired_path.traceable
-        & (desired_path.length > 0)
-        & task.carries
-        & ~desired_path.arc
-    )
+    on = result.corrected & desired_path.traceable & (desired_path.length > 0) & task.carries
     on[list({**path.constraints.locked, **path.constraints.no_insert_before})] = False
     good = (
         on[row] & on[before] & (result.cut[row] == result.cut[before]) & (path.tool[row] == path.tool[before])
@@ -161,12 +186,16 @@ def _ramps(
         a[good][: 2 * MOST] for a in (row, end, knot, vertex, reach, fewest)
     )
     exact = reach[:, 0] == 0
+    arc = np.stack([desired_path.arc[row - 1], desired_path.arc[row]], axis=1)
     feed = np.nan_to_num(np.maximum(path.feed[row], path.feed[row - 1]))
-    spacing = np.maximum(limits.ramp_end, feed * limits.cycle)
+    spacing = np.broadcast_to(np.maximum(limits.ramp_end, feed * limits.cycle)[:, None], arc.shape).copy()
+    for side in (0, 1):
+        some = np.flatnonzero(arc[:, side])
+        spacing[some, side] = np.maximum(spacing[some, side], shortest_arc(task, row[some] - 1 + side))
     # as far as nothing else is: half of what is left of either motion
     taken = np.zeros(len(path))
     taken[parts.row] = np.minimum(parts.length - parts.start, parts.extent)
-    last = end + 2.0 * spacing
+    last = end + 2.0 * spacing[:, 1]
     beyond, inner = length[row] - end, np.zeros(len(row), np.int64)
     place = division.share[inserted] * length[division.source[inserted]]
     behind = np.where(exact, np.inf, length[row - 1] - taken[row - 1])
@@ -176,16 +205,21 @@ def _ramps(
         further = here[1][here[1] > last[k]]
         beyond[k] = min(beyond[k], *(further - end[k])) if len(further) else beyond[k]
         others = place[
-            (division.source[inserted] == row[k] - 1) & (place > taken[row[k] - 1] + 2.0 * spacing[k])
+            (division.source[inserted] == row[k] - 1) & (place > taken[row[k] - 1] + 2.0 * spacing[k, 0])
         ]
         behind[k] = min(behind[k], length[row[k] - 1] - others.max()) if len(others) else behind[k]
     most = reach.max(axis=1)
-    margin = np.minimum(MARGIN + 2.0 * most, 0.5 * np.minimum(beyond, behind))
-    good = (margin >= most + 2.0 * spacing) & (
+    # from the next point on an arc bends anew
+    half = np.where(arc, 1.0, 0.5) * np.minimum(
+        np.stack([behind, beyond], axis=1), np.where(arc, np.inf, 1e3)
+    )
+    straight = np.minimum(MARGIN + 2.0 * most, half.min(axis=1))
+    margin = np.where(arc, np.minimum(half, ON_ARC), straight[:, None])
+    good = (margin >= most[:, None] + 2.0 * spacing).all(axis=1) & (
         inner + _rounded_off(task, division, vertex, knot, end, most) > 1
     )
     chosen = np.flatnonzero(good)[:MOST]
-    ramps = _FittedRamps(vertex, knot, row, end, exact, reach, spacing, margin, vertex + inner + 1)
+    ramps = _FittedRamps(vertex, knot, row, end, exact, reach, spacing, margin, vertex + inner + 1, arc)
     return ramps[chosen], inner[chosen], fewest[chosen]
 
 
@@ -207,19 +241,22 @@ def _rounded_off(
 def _curves(task: CompensationProblem, division: Subdivision, ramps: _FittedRamps) -> Curves:
     """Commands by which the tool is on the rounded path of the program, from before the vertex (there, where it is
     exact) to after the ramp."""
-    sides = np.where(ramps.exact, 1.0, 2.0) * ramps.margin
-    on_ramp = np.ceil((PLACES - 1) * ramps.end / (ramps.end + sides))
+    rounded = np.stack([~ramps.exact, np.ones(len(ramps.row), bool)], axis=1)
+    sides = np.where(rounded, ramps.margin, 0.0)
+    on_ramp = np.ceil((PLACES - 1) * ramps.end / (ramps.end + sides.sum(axis=1)))
     step = ramps.end / on_ramp  # the curve turns where the ramp starts and ends: there are places
-    first = -step * np.where(ramps.exact, 0.0, np.floor(0.5 * (PLACES - 1 - on_ramp)))
+    before = np.floor((PLACES - 1 - on_ramp) * sides[:, 0] / sides.sum(axis=1))
+    first = -step * before
     along = (first[:, None] + step[:, None] * np.arange(PLACES)).ravel()
     row = np.repeat(ramps.row, PLACES)
     row = np.where(along < 0.0, row - 1, row)
     share = along / task.desired_path.length[row]
     share = np.where(along < 0.0, 1.0 + share, share)
     place = commands_on_rounded_path(task, row, share).position
+    bent = commands_on_path(task, row, share).position if ramps.arc.any() else place
     tangent = original(task, row, share)[1]
     shape = (len(ramps.row), PLACES, 3)
-    place, tangent = place.reshape(shape), tangent.reshape(shape)
+    place, bent, tangent = place.reshape(shape), bent.reshape(shape), tangent.reshape(shape)
     turn = np.stack([np.zeros(len(first)), ramps.end], axis=1)
     # the points before the vertex, or it, and after those of the ramp
     before = np.where(ramps.exact, ramps.vertex, ramps.vertex - 1)
@@ -227,9 +264,14 @@ def _curves(task: CompensationProblem, division: Subdivision, ramps: _FittedRamp
     stop = first + step * (PLACES - 1)
     away = [np.sum((far[k] - place[:, -k]) * tangent[:, -k], axis=1) for k in (0, 1)]
     ends = np.stack([first + np.minimum(away[0], -step), stop + np.maximum(away[1], step)], axis=1)
-    place = np.concatenate([far[0][:, None], place, far[1][:, None]], axis=1)
+    for side, (motion, row) in enumerate(((before, ramps.row - 1), (ramps.after, ramps.row))):
+        share = np.where(division.source[motion] == row, division.share[motion], 0.0)
+        on_path = task.desired_path.length[row] * (share if side else share - 1.0)
+        beyond = np.maximum(on_path, stop + NEAREST) if side else np.minimum(on_path, first - NEAREST)
+        ends[:, side] = np.where(ramps.arc[:, side] & rounded[:, side], beyond, ends[:, side])
+    place, bent = (np.concatenate([far[0][:, None], a, far[1][:, None]], axis=1) for a in (place, bent))
     tangent = np.concatenate([tangent[:, :1], tangent, tangent[:, -1:]], axis=1)
-    return Curves(first, step, ends, turn, place, tangent)
+    return Curves(first, step, ends, turn, place, tangent, ramps.arc, bent)
 
 
 _V, _E = "vertex", "end"
@@ -261,37 +303,58 @@ _STARTS: tuple[tuple[tuple[tuple[str, float], ...], ...], ...] = (
 BESIDE = 0.75
 """Share of the approximation."""
 
+SPARE = 1.02
+"""A line is longer by this factor than the shortest, where points start: they are to move."""
 
-def _starts(ramps: _FittedRamps, count: int) -> tuple[Floats, Ints]:
+
+def _starts(ramps: _FittedRamps, curves: Curves, count: int) -> tuple[Floats, Ints]:
     """(T, G, n) [m] from the vertex, and (T,) which of them is the vertex (the ramp's end where that is exact)."""
-    beside = np.maximum(BESIDE * ramps.reach[:, 0], ramps.spacing)
-    starts, own = [], []
-    for words in _STARTS[count - 1]:
-        starts.append(
-            np.stack([k * beside if at == _V else ramps.end + k * ramps.spacing for at, k in words], axis=1)
-        )
-        own.append(words.index((_V, 0.0)))
-    return np.stack(starts), np.array(own)
+    beside = np.maximum(BESIDE * ramps.reach[:, :1], ramps.spacing)
+    starts = [_apart(ramps, curves, words, beside) for words in _STARTS[count - 1]]
+    return np.stack(starts), np.array([words.index((_V, 0.0)) for words in _STARTS[count - 1]])
 
 
-def _exact_starts(ramps: _FittedRamps, count: int) -> tuple[Floats, Ints]:
+def _exact_starts(ramps: _FittedRamps, curves: Curves, count: int) -> tuple[Floats, Ints]:
     """As ``_starts``, of ramps that start at an exact vertex: it stays where it is."""
-    steps = {1: ((0,),), 2: ((0, 1), (-1, 0)), 3: ((-1, 0, 1),)}.get(count, ())
-    starts = [np.stack([ramps.end + k * ramps.spacing for k in each], axis=1) for each in steps]
-    own = [each.index(0) for each in steps]
-    return np.array(starts), np.array(own, np.int64)
+    steps: tuple[tuple[float, ...], ...] = {
+        1: ((0.0,),),
+        2: ((0.0, 1.0), (-1.0, 0.0)),
+        3: ((-1.0, 0.0, 1.0),),
+    }.get(count, ())
+    starts = [_apart(ramps, curves, tuple((_E, k) for k in each), ramps.spacing) for each in steps]
+    return np.array(starts), np.array([each.index(0.0) for each in steps], np.int64)
+
+
+def _apart(
+    ramps: _FittedRamps, curves: Curves, words: tuple[tuple[str, float], ...], beside: Floats
+) -> Floats:
+    """(G, n) [m] from the vertex, where the points ``words`` lie on the curves: ``beside`` (G, 2) [m] before and after
+    the vertex, the shortest motion before and after the end of the ramp, or farther, until no line is too short."""
+    found = np.empty((len(ramps.row), len(words)))
+    for at, centre in ((_V, np.zeros(len(ramps.row))), (_E, ramps.end)):
+        for way in (-1, 1):
+            step = beside[:, max(way, 0)] if at == _V else ramps.spacing[:, 1]
+            least = ramps.spacing[:, max(way, 0)] if at == _V else ramps.spacing[:, 1]
+            last = centre
+            mine = [n for n, (other, k) in enumerate(words) if other == at and k * way >= 0]
+            for n in sorted(mine, key=lambda n: abs(words[n][1])):
+                if words[n][1]:
+                    last = curves.away(last, centre + words[n][1] * step, SPARE * least, way)
+                found[:, n] = last
+    return found
 
 
 def _fitted(
     ramps: _FittedRamps, curves: Curves, count: int, allowed: float, names: Ints
 ) -> dict[int, _FittedPoints]:
-    """Of the ramps that ``count`` inserted points can follow, their points by ``names`` (G,)."""
+    """The points of ramps with ``count`` inserted ones that are within ``allowed`` [m], or come nearest to it, by
+    ``names`` (G,)."""
     found: dict[int, _FittedPoints] = {}
     for exact in (False, True):
         some = np.flatnonzero(ramps.exact == exact)
         if not len(some):
             continue
-        starts, own = (_exact_starts if exact else _starts)(ramps[some], count)
+        starts, own = (_exact_starts if exact else _starts)(ramps[some], curves[some], count)
         left = np.arange(len(some))
         for start, place in zip(starts, own.tolist(), strict=True):
             part, curve = ramps[some[left]], curves[some[left]]
@@ -300,13 +363,15 @@ def _fitted(
             width = parameter.shape[1]
             before = np.arange(width) <= (-1 if exact else place + 1)
             reach = np.where(before, part.reach[:, :1], part.reach[:, 1:])
-            shortest = np.broadcast_to(part.spacing[:, None], (len(left), width - 1))
-            points, largest = fit_points(curve, parameter, reach, shortest, ENOUGH * allowed)
+            vertex = 0 if exact else place + 1
+            shortest = np.where(np.arange(width - 1) < vertex, part.spacing[:, :1], part.spacing[:, 1:])
+            points, largest = fit_points(curve, parameter, reach, shortest, ENOUGH * allowed, vertex)
             along = curve.nearest(points, parameter)[:, 1:-1]
-            good = largest <= allowed
-            for k in np.flatnonzero(good).tolist():
-                found[int(names[some[left[k]]])] = _FittedPoints(points[k, 1:-1], along[k], place)
-            left = left[~good]
+            for k, size in enumerate(largest.tolist()):
+                name = int(names[some[left[k]]])
+                if name not in found or size < found[name].largest:
+                    found[name] = _FittedPoints(points[k, 1:-1], along[k], place, size)
+            left = left[largest > allowed]
             if not len(left):
                 break
     return found
@@ -327,14 +392,14 @@ def _without_points(
         ramp, points = ramps[np.array([name])], fitted[name]
         here = int(ramp.row[0])
         mine = inserted[division.source[inserted] == here]
-        last = ramp.end[0] + 2.0 * ramp.spacing[0]
+        last = ramp.end[0] + 2.0 * ramp.spacing[0, 1]
         mine = mine[division.share[mine] * length[here] <= last]
         kept = int(ramp.knot[0]) if ramp.exact[0] else int(ramp.vertex[0])
         dropped += [k for k in mine.tolist() if k != kept]
         own.append(kept)
         moved.append(points.place[points.own])
         fixed = float(ramp.end[0]) if ramp.exact[0] else 0.0
-        apart = APART * ramp.spacing[0]
+        apart = APART * ramp.spacing[0].min()
         along = points.along.copy()
         along[points.own] = fixed
         for k in range(points.own + 1, len(along)):

@@ -131,8 +131,8 @@ class RoundedOutput:
 
     def peaks(self, at: Ints, share: Floats, closer: int = CLOSER) -> tuple[Floats, Floats]:
         """(K,) [m] and (K,) [rad]: by how much the tool is off at most at the shares (K, S) of the segments ``at``
-        (K, S), in the order of the path, ``closer`` times nearer around the ``PEAKS`` largest of its peaks, and where
-        the force starts or ends to change over a ramp: there it turns."""
+        (K, S), in the order of the path, ``closer`` times nearer around the ``PEAKS`` largest of its peaks, and at
+        the ``turns`` of the force."""
         many, count = share.shape
         off, angle = np.zeros(many), np.zeros(many)
         gap = np.where(np.diff(at, axis=1) == 0, np.diff(share, axis=1), 0.0)
@@ -145,9 +145,10 @@ class RoundedOutput:
             angle = np.maximum(angle, turned.reshape(many, -1).max(axis=1))
             if level == closer:
                 break
-            if level == 0 and self.turns.size:
-                for part in self._where_force_turns(at, share, found):
-                    off, angle = np.maximum(off, part[0]), np.maximum(angle, part[1])
+            if level == 0:
+                for which, _, _, there in self.where_force_turns(at, share, found):
+                    np.maximum.at(off, which, lengths(there.shift))
+                    np.maximum.at(angle, which, lengths(there.turn))
             if level == 0:
                 padded = np.pad(here, ((0, 0), (1, 1)), constant_values=-1.0)
                 top = (here >= padded[:, :-2]) & (here >= padded[:, 2:])
@@ -163,22 +164,29 @@ class RoundedOutput:
 
     @cached_property
     def turns(self) -> Floats:
-        """(T, 2) rows and shares of the program's path near these motions where ramps of the force start or end."""
-        ramps = self.task.force.ramps
-        if ramps is None or not len(self.motions):
+        """(T, 2) rows and shares of the program's path near these motions where the force turns: where ramps of it
+        start or end, and where motions start, as it changes within them."""
+        if not len(self.motions):
             return np.empty((0, 2))
-        rows = self.segments.rows
-        row, share = ramps.ends()
-        start = ramps.row[ramps.start <= 0.0]
-        row, share = np.concatenate([row, start]), np.concatenate([share, np.zeros(len(start))])
-        near = np.isin(row, np.concatenate([rows, rows + 1]))
-        return np.stack([row[near], share[near]], axis=1)
+        rows = np.unique(self.segments.rows)
+        rows = np.union1d(rows, np.minimum(rows + 1, len(self.task.toolpath) - 1))
+        row = rows[self.task.carries[rows]]
+        share = np.zeros(len(row))
+        ramps = self.task.force.ramps
+        if ramps is not None:
+            end, at = ramps.ends()
+            near = np.isin(end, rows)
+            row, share = np.concatenate([row, end[near]]), np.concatenate([share, at[near]])
+        return np.stack([row, share], axis=1)
 
-    def _where_force_turns(
+    def where_force_turns(
         self, at: Ints, share: Floats, deviations: Deviations
-    ) -> Iterator[tuple[Floats, Floats]]:
-        """Errors (K,) [m] and (K,) [rad] where the tool is at the ``turns`` of the force: between the two of the shares
-        (K, S) of the segments ``at`` (K, S) beside each, of which the places are ``deviations`` (K S)."""
+    ) -> Iterator[tuple[Ints, Ints, Floats, Deviations]]:
+        """Where the tool is at the ``turns`` of the force, nearer each time: between the two of the shares (K, S) of
+        the segments ``at`` (K, S) beside each, of which the places are ``deviations`` (K S).  Which (T,) of the K they are,
+        their segments (T,) and shares (T,), and the deviations (T) there."""
+        if not self.turns.size:
+            return
         low = int(min(deviations.row.min(), self.turns[:, 0].min()))
         high = int(max(deviations.row.max(), self.turns[:, 0].max()))
         length = self.task.desired_path.length[low : high + 1]
@@ -200,10 +208,7 @@ class RoundedOutput:
             between = ends[0] - away[0] * (ends[1] - ends[0]) / np.maximum(away[1] - away[0], NEAREST)
             between = np.clip(between, *ends)
             here = self.deviations(segment, between)
-            off, angle = np.zeros(len(at)), np.zeros(len(at))
-            np.maximum.at(off, which, lengths(here.shift))
-            np.maximum.at(angle, which, lengths(here.turn))
-            yield off, angle
+            yield which, segment, between, here
             gap = (
                 begins[np.clip(here.row - low, 0, len(length) - 1)]
                 + here.share * self.task.desired_path.length[here.row]

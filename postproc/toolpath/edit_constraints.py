@@ -26,8 +26,8 @@ class EditConstraints(MotionColumns):
     ``no_insert_before``, but one straight transition move may precede that line.
     ``orientation_programmed`` (N,): the text programs the orientation and it can be written; else it is given from
     outside and only the position can be corrected.
-    ``inserted_approximation`` (N,) [m]: of points that are inserted into an arc that ends exactly; NaN where it is not
-    known.
+    ``inserted_approximation`` (N,) [m]: of points that are inserted into a motion that ends exactly; NaN where it is
+    not known.
     ``exact_stays``: what is inserted before an end point that is passed exactly is passed exactly as well (G61);
     without, it is approximated.
     ``ptp_may_change_configuration``: a point-to-point motion may lead into another configuration of the robot;

@@ -44,9 +44,12 @@ STEPS, HALVINGS = 10, 60
 SAME_GUESS = 1e-6
 """Parts of an interval by which two first places of a command differ by rounding alone."""
 
-LEAP, LEAST_LEAP, BESIDE = 4.0, 0.05 * MM, 24
+LEAP, LEAST_LEAP, BESIDE, WALKS = 4.0, 0.05 * MM, 24, 40
 """By how many times the step of the command, and how much [m], a place leaps at least; so many commands before and
-after it are tried on its other side."""
+after it are tried on its other side, and so often at most, from where it leaps then."""
+
+STRIDES = (0.02, 0.03, 0.05, 0.1, 0.1, 0.2, 0.2, 0.3, 0.5, 1.0)
+"""Parts of intervals in which a place is looked for beside another one."""
 
 FLAT = 0.02
 """Least slope of h that a step is taken with, in parts of a path that the force does not move."""
@@ -114,11 +117,14 @@ def place_tool(
     todo = np.flatnonzero(~placed.settled | ~(np.abs(guess - placed.guess) <= SAME_GUESS))
     low, high = grid.first[stretch], grid.first[stretch + 1] - 2
 
-    def solved(some: Ints, interval: Ints, part: Floats) -> PlacedTool:
+    def solved(some: Ints, interval: Ints, part: Floats, beside: bool = False) -> PlacedTool:
         there = path.at(motion[some], share[some])
         came = None if path.sides is None else path.sides.at(motion[some], share[some])
         here = _Solution(grid, path.task, motion[some], share[some], there, came, low[some], high[some])
-        here.find(interval, part)
+        if beside:
+            here.find_beside(interval + part)
+        else:
+            here.find(interval, part)
         here.turn_on_the_spot()
         row, share_there = grid.place(here.interval, here.part)
         wanted = grid.path.at(row, share_there).rotation
@@ -134,12 +140,17 @@ def place_tool(
 
     each_block(solve_block, len(todo))
     # of the original alone, which nothing is judged by, that would take a third of the time
-    for some, place in _beside_leaps(placed, stretch) if path is not grid.path else ():
-        start = np.minimum(place.astype(np.int64), high[some])
-        other = solved(some, start, place - start)
-        size, new = lengths(placed.error[some]), lengths(other.error)
-        nearer = np.flatnonzero(other.settled & (~placed.settled[some] | (new < size - RESIDUAL)))
-        placed.put(some[nearer], other.at(nearer))
+    for _ in range(WALKS if path is not grid.path else 0):
+        walked = False
+        for some, place in _beside_leaps(placed, stretch):
+            start = np.minimum(place.astype(np.int64), high[some])
+            other = solved(some, start, place - start, beside=True)
+            size, new = lengths(placed.error[some]), lengths(other.error)
+            nearer = np.flatnonzero(other.settled & (~placed.settled[some] | (new < size - RESIDUAL)))
+            placed.put(some[nearer], other.at(nearer))
+            walked |= len(nearer) > 0
+        if not walked:  # where it leaps now both sides are as near
+            break
     return placed
 
 
@@ -207,6 +218,34 @@ class _Solution:
                 return
             self._step(active, ahead)
         self._bracket(active, interval[active])
+
+    def find_beside(self, place: Floats) -> None:
+        """From ``place`` (S,), numbers of intervals with their parts after the point, the next place in the direction
+        in which the tool is off it: no step leads over one."""
+        active = np.arange(len(place))
+        self.interval, self.part = np.zeros(len(place), np.int64), np.zeros(len(place))
+        ahead = self._at(active, place)
+        way = np.sign(ahead)
+        near, far, there = place.copy(), place.copy(), ahead.copy()
+        going = ~self.settled & np.isfinite(ahead)
+        for step in STRIDES:
+            some = np.flatnonzero(going)
+            if not len(some):
+                break
+            far[some] = np.clip(near[some] + step * way[some], self.low[some], self.high[some] + 1)
+            there[some] = self._at(some, far[some])
+            passed = there[some] * way[some] <= 0
+            on = some[~passed]
+            near[on], ahead[on] = far[on], there[on]
+            going[some[passed | ~np.isfinite(there[some])]] = False
+        some = np.flatnonzero(~self.settled & np.isfinite(there) & (there * way <= 0))
+        forth = way[some] > 0
+        ends = (
+            (np.where(forth, a[some], b[some]), np.where(forth, b[some], a[some]))
+            for a, b in ((near, far), (ahead, there))
+        )
+        (below, above), (one, two) = ends
+        self._between(some, below, above, one, two)
 
     def turn_on_the_spot(self) -> None:
         """Where a motion of the original only turns the tool, all of its path is one place: there the orientation shows
@@ -307,7 +346,11 @@ class _Solution:
             above[some] = np.minimum(at[some] + 1 + wider, self.high[rows] + 1)
             one[some], two[some] = self._at(rows, below[some]), self._at(rows, above[some])
             enclosed[some] = (one[some] >= 0) & (two[some] <= 0)
-        active, below, above, one, two = (values[enclosed] for values in (active, below, above, one, two))
+        self._between(*(values[enclosed] for values in (active, below, above, one, two)))
+
+    def _between(self, active: Ints, below: Floats, above: Floats, one: Floats, two: Floats) -> None:
+        """Places between those ``below``, of which the tools are ``one`` (K,) [m] ahead, and those ``above``:
+        ``two``."""
         side = np.zeros(len(active), np.int64)
         for _ in range(HALVINGS):
             if not len(active):

@@ -17,7 +17,7 @@ from .cell import Cell
 from .force import RULE, STRETCHED, Field
 from .motion import MM, Motion
 from .path import Path
-from .placing import BETWEEN, Tools, find_places, settle_places
+from .placing import BETWEEN, Tools, find_places, nearest_across_leaps, settle_places
 from .reader import read
 from .robot import Robot, check_on_mujoco, rotation_vectors, rotations
 
@@ -213,7 +213,8 @@ def _along(wanted: Path, cut: tuple, path: Path, rows: tuple, one: Field, nodes:
     place, lost = find_places(wanted, cut, one, label, tools)
     for _ in range(ROUNDS):
         distance = np.linalg.norm(tools.loaded(one.at(place))[0] - wanted.points(place, *cut), axis=1)
-        more = _beside_worst(label, distance)
+        more = np.union1d(_beside_worst(label, distance), _at_vertices(wanted, cut, label, place))
+        more = np.setdiff1d(more, label)
         finer = Tools(path, rows, more, nodes)
         found, gone = settle_places(
             wanted, cut, one, np.interp(more, label, place), finer.loaded, reaches=BETWEEN
@@ -222,6 +223,7 @@ def _along(wanted: Path, cut: tuple, path: Path, rows: tuple, one: Field, nodes:
         order = np.argsort(label, kind="stable")
         label = label[order]
         place, lost = (np.concatenate(two)[order] for two in ((place, found[~gone]), (lost, gone[~gone])))
+        place = nearest_across_leaps(wanted, cut, one, label, place, lambda at: Tools(path, rows, at, nodes))
         tools = Tools(path, rows, label, nodes)
     motion, _ = path.find(label, *rows)
     wrench = one.at(place)
@@ -263,6 +265,14 @@ def _beside_worst(label: np.ndarray, distance: np.ndarray) -> np.ndarray:
     start = np.unique(np.clip(np.concatenate([worst - 1, worst]), 0, len(label) - 2))
     parts = np.arange(1, PARTS) / PARTS
     return (label[start, None] + parts * (label[start + 1] - label[start])[:, None]).ravel()
+
+
+def _at_vertices(wanted: Path, cut: tuple, label: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Labels at which the tool passes the vertices of the original's path: the force turns there, and the error with
+    it, in a peak that may lie between two samples."""
+    rising = np.maximum.accumulate(place)
+    inner = wanted.start[cut[0] + 1 : cut[1] + 1]
+    return np.interp(inner[(inner > rising[0]) & (inner < rising[-1])], rising, label)
 
 
 def _between(one: np.ndarray, two: np.ndarray) -> np.ndarray:

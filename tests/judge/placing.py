@@ -23,6 +23,9 @@ REACHES, CLOSE = (1.1, 3.3, 10.0, 30.0, 100.0), (0.5, 3.0, 10.0)
 BETWEEN = (0.1, *CLOSE, 30.0)
 """Steps of the grid to either side in which a place is looked for again, one after the other."""
 SETTLED = 1e-10
+LEAP, LEAST_LEAP, AROUND, PARTS = 4.0, 0.05 * MM, 1.0 * MM, 400
+"""Where a place leaps, by so many times the way of the program and so much at least, there may be two: so far around it
+all places across the leap are looked for, on so many parts of it."""
 
 
 class Tools:
@@ -92,6 +95,35 @@ def settle_places(
         if moved < SETTLED:
             break
     return place, lost
+
+
+def nearest_across_leaps(
+    wanted: Path, cut: tuple, one: Field, label: np.ndarray, place: np.ndarray, tools_at: Callable
+) -> np.ndarray:
+    """The labels ``place`` (S,), with those of the nearer place where there are two; ``tools_at``: ``Tools`` at
+    labels."""
+    place = place.copy()
+    for k in np.flatnonzero(np.diff(place) > LEAP * np.diff(label) + LEAST_LEAP):
+        rows = np.flatnonzero(np.abs(label - label[k]) < AROUND)
+        tools = tools_at(label[rows])
+        at = np.linspace(place[k] - LEAST_LEAP, place[k + 1] + LEAST_LEAP, PARTS + 1)
+        wrench, points, tangents = one.at(place[rows]), wanted.points(at, *cut), wanted.direction(at, *cut)
+        there, _, gives = tools.loaded(wrench)
+        other = place[rows].copy()
+        for j in range(len(rows)):
+            beside = there[j] + (one.at(at) - wrench[j]) @ gives[j].T - points
+            ahead = (beside * tangents).sum(1)
+            here = np.flatnonzero((ahead[:-1] > 0) & (ahead[1:] <= 0))
+            if len(here):
+                best = here[np.argmin((beside[here] ** 2).sum(1))]
+                other[j] = at[best] + (at[1] - at[0]) * ahead[best] / (ahead[best] - ahead[best + 1])
+        found, gone = settle_places(wanted, cut, one, other, tools.loaded, (0.02, 0.1, 0.5))
+        away = [
+            np.linalg.norm(tools.loaded(one.at(p))[0] - wanted.points(p, *cut), axis=1)
+            for p in (place[rows], found)
+        ]
+        place[rows] = np.where(~gone & (away[1] < away[0]), found, place[rows])
+    return place
 
 
 def _march(

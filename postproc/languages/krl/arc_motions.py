@@ -65,8 +65,6 @@ def move_on_arc(
         end_point = end_point._replace(target=UnknownValue(code_of, "its path is not known"), builds=True)
     before = state.sources
     row = enter_motion(run, statement, Kind.CIRC, end_point, reason, blend, found, relative)
-    if blend == 0:
-        run.rows.arc_blends[row] = state.steady_blend
     if row in run.rows.reasons:
         run.rows.builds_on[row] = before
     if isinstance(first.target, KrlTarget):

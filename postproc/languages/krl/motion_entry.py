@@ -108,7 +108,7 @@ def enter_motion(
             kind, statement.line, extent(statement, operand), values or NAN6, axes or NAN6,
             NAN if kind in (Kind.PTP, Kind.AXIS) else state.steady_feed, *_frames(state, kind), blend,
             stated, _inherits(stated, relative), path_of(arc) if values is not None else NO_ARC,
-            state.orientation, state.arc_frame, external,
+            state.orientation, state.arc_frame, external, state.steady_blend,
         ),
         anchor,
     )  # fmt: skip

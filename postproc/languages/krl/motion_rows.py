@@ -33,7 +33,8 @@ class RowRefusal(NamedTuple):
 
 
 class MotionRow(NamedTuple):
-    """A motion that was read alone; see Toolpath and KrlSourceMap for what its entries mean (mm, deg)."""
+    """A motion that was read alone; see Toolpath and KrlSourceMap for what its entries mean (mm, deg).  inserted: of
+    points that are inserted into it, the approximation with C_DIS."""
 
     kind: int
     line: int
@@ -50,6 +51,7 @@ class MotionRow(NamedTuple):
     orientation: int = 0
     arc_frame: int = 0
     external: Numbers = UNSTATED
+    inserted: float = NAN
 
 
 class VectorisedLot(NamedTuple):
@@ -70,8 +72,8 @@ class MotionRows:
     """``chunks``: single rows and runs of common lines in their order; ``places``: rows by what is rare.
 
     ``passing``: points of spline blocks; ``entries``: first point of such a block -> line of its header.
-    ``arc_blends``: exact arcs -> $APO.CDIS [mm] there.  ``sources_of``: rows that may start elsewhere than where the
-    row before ends -> where.  ``stopped``: rows before which the advance run stops (2) or may (1);
+    ``sources_of``: rows that may start elsewhere than where the row before ends -> where.
+    ``stopped``: rows before which the advance run stops (2) or may (1);
     ``stopped_at_end``: the same of ends of routines: the count of rows, their sources, and 2 or 1.
     ``calls``: the count of rows, and after which ones a routine of another module moves the robot.
     ``unfollowed_ends``: where routines end after which it is not known what runs.
@@ -97,7 +99,6 @@ class MotionRows:
     never_from: int | None = None
     inline: dict[int, InlineForm] = field(default_factory=dict)
     approximated: dict[int, float] = field(default_factory=dict)
-    arc_blends: dict[int, float] = field(default_factory=dict)
     builds_on: dict[int, frozenset[Source]] = field(default_factory=dict)
     reads: list[tuple[int, frozenset[Source]]] = field(default_factory=list)
     sources: defaultdict[bytes, set[Source]] = field(default_factory=lambda: defaultdict(set))
@@ -186,7 +187,7 @@ class MotionRows:
                 self.count -= size
         for sparse in (
             self.anchors, self.reasons, self.variables, self.locked, self.arcs, self.relative,
-            self.no_insert_before, self.inline, self.approximated, self.arc_blends, self.builds_on,
+            self.no_insert_before, self.inline, self.approximated, self.builds_on,
             self.passing, self.entries, self.sources_of, self.stopped,
         ):  # fmt: skip
             while sparse and next(reversed(sparse)) >= count:

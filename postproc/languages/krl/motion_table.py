@@ -89,7 +89,7 @@ class MotionTable:
         self.line = np.empty(n, np.int32)
         self.status, self.turn = (np.broadcast_to(np.int32(-1), n) for _ in range(2))
         self.base, self.tool = np.empty(n, np.int32), np.empty(n, np.int32)
-        self.feed, self.blend = np.empty(n), np.empty(n)
+        self.feed, self.blend, self.inserted = np.empty(n), np.empty(n), np.empty(n)
         self.word = np.empty(n, offset_type(size))
         self.orientation, self.arc_frame = np.zeros(n, np.int8), np.zeros(n, np.int8)
         self.spots = Spots(n, size) if places else None
@@ -116,6 +116,7 @@ class MotionTable:
             self.base[part], self.tool[part] = chunk.base, chunk.tool
             self.feed[part] = np.where(vectorised.is_line, chunk.feed, NAN)
             self.blend[part] = np.array([0.0, chunk.blend, NAN])[vectorised.approximation]
+            self.inserted[part] = chunk.blend
             self.word[part] = vectorised.motion[:, 0]
             self.orientation[part], self.arc_frame[part] = chunk.orientation, chunk.arc_frame
             if self.spots is not None:
@@ -157,6 +158,7 @@ class MotionTable:
             (self.kind, columns.kind), (self.line, columns.line), (self.base, columns.base),
             (self.tool, columns.tool), (self.feed, columns.feed), (self.blend, columns.blend),
             (self.orientation, columns.orientation), (self.arc_frame, columns.arc_frame),
+            (self.inserted, columns.inserted),
         ):  # fmt: skip
             array[part] = column
         self.word[part] = [places[0] for places in columns.motion]

@@ -52,6 +52,7 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
     table.tool, frames = with_declared(run.declarations.frames, b"TOOL", table.tool, frames)
     table.base, table.tool, used = _used(table.base, table.tool, frames)
     table.blend *= MM
+    table.inserted *= MM
     n = len(rows)
     anchor = _sparse((n,), np.int32(-1), {row: at.row for row, at in rows.anchors.items()})
     given = _partial_components(rows, n)
@@ -75,7 +76,7 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
             no_insert_before=_no_insert_before(rows, several, continues),
             spline_headers=_entries(rows, several),
             orientation_programmed=_correctable_orientations(table),
-            inserted_approximation=_sparse((n,), np.nan, rows.arc_blends, MM),
+            inserted_approximation=_read_only(table.inserted),
         ),
         annotations=tuple(rows.annotations),
         partial_targets=PartialTargets(anchor, given),
