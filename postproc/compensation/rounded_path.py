@@ -183,8 +183,8 @@ class RoundedOutput:
         self, at: Ints, share: Floats, deviations: Deviations
     ) -> Iterator[tuple[Ints, Ints, Floats, Deviations]]:
         """Where the tool is at the ``turns`` of the force, nearer each time: between the two of the shares (K, S) of
-        the segments ``at`` (K, S) beside each, of which the places are ``deviations`` (K S).  Which (T,) of the K they are,
-        their segments (T,) and shares (T,), and the deviations (T) there."""
+        the segments ``at`` (K, S) beside each, of which the places are ``deviations`` (K S).  Which (T,) of the K they
+        are, their segments (T,) and shares (T,), and the deviations (T) there."""
         if not self.turns.size:
             return
         low = int(min(deviations.row.min(), self.turns[:, 0].min()))

@@ -380,7 +380,7 @@ def frame_events(
     leave(linear, modal.switched(Group.OFFSET) | spoiled, What.BASE)
     if (apart := force[Group.OFFSET] < 0).any():
         # from one offset that is not known to another one
-        leave(linear, apart & (flow.reason != FlowReason.NONE) & given.has(key("G")), What.BASE)
+        leave(linear, apart & (flow.reason != FlowReason.NONE) & words.has(key("G")), What.BASE)
     for group in FRAMED:
         if force[group].any() or modal.ahead[group]:
             lose(whole, (force[group] != 0) & words.motion, What.FRAME)

@@ -130,5 +130,5 @@ def stopped_motions(rows: MotionRows, continues: Bools) -> dict[int, float]:
         }
     # what runs before the first motion of another module, or after a routine that is read apart, is not worked out
     called = expanded(rows, {source for _, sources in rows.calls for source in sources})
-    left = expanded(rows, rows.left_from) - found.keys()
+    left = expanded(rows, rows.unfollowed_ends) - found.keys()
     return found | {before: NAN for before in called | left if before >= 0}
