@@ -15,7 +15,7 @@ from measured import MARKERS, on_markers, plan, robot
 
 from postproc.base.geometry import Poses
 from postproc.diagnosis import verdict
-from postproc.diagnosis.candidates import EVERY, candidates, fewest_parameters, is_visible
+from postproc.diagnosis.candidates import candidates, fewest_parameters, is_visible
 from postproc.diagnosis.decoys import AlternativeForm, decoys
 from postproc.diagnosis.diagnosis import diagnose
 from postproc.diagnosis.nonlinear_effects import broyden_update, evaluate_at_size
@@ -260,20 +260,6 @@ def test_a_wave_of_another_order_is_no_harmonic():
             assert named.evidence.alias is None or not isinstance(
                 named.evidence.alias.effect, AlternativeForm
             )
-
-
-def test_waves_of_all_gears_are_held_against_other_orders_in_all_of_them():
-    campaign = campaign_of(wave(stated(), 1.0), 20, deflection=False, in_robot_frame=True)
-    base = fitted(campaign)
-    whole_arm = [
-        c
-        for c in candidates(campaign, base.model, base.point.nuisances)
-        if (c.name, c.joint) == ("transmission_error", EVERY)
-    ]
-    assert whole_arm
-    for mine in whole_arm:
-        against = decoys(base.model, campaign.readings.q, mine)
-        assert [len(one.unknowns) for one in against] == [12] * len(against)
 
 
 @pytest.mark.parametrize(

@@ -57,3 +57,19 @@ def test_a_first_harmonic_explains_a_little_more(compensate, tmp_path):
     told, _ = identified(compensate, tmp_path, "link_geometry,joint_offset,transmission_error")
     assert told["validation"]["after_mean_mm"] <= 0.092
     assert told["gap"]["held_out_after_mean_mm"] <= 0.095
+
+
+def test_a_diagnosis_names_what_transfers(compensate, tmp_path):
+    """Geometry, zeros and waves of the gears; what remains is a statement of its own."""
+    done = compensate(
+        *("diagnose", FOLDER / "train.csv", "--robot", "ur5", "--validate", FOLDER / "test.csv"),
+        *("-o", tmp_path / "ur5_new.yaml", "--json", "-"),
+    )
+    assert done.json["verdict"] == "partly_named"
+    assert {one["effect"] for one in done.json["named"]} == {
+        "link_geometry",
+        "joint_offset",
+        "transmission_error",
+    }
+    (kept_aside,) = done.json["validation"]
+    assert kept_aside["after_mean_mm"] <= 0.09
