@@ -133,8 +133,8 @@ class Motions(Spelling):
         return words
 
     def spline(self) -> None:
-        """Cubic ones that follow each other, in the plane XY, and a motion from there: where they end rs274 forgets with
-        the next change of tools."""
+        """Cubic ones that follow each other, in the plane XY, and a motion from there: rs274 forgets where they end
+        with the next change of tools."""
         self.flush()
         if self.modes.plane != 17 or self.modes.timed:
             return self.line()
