@@ -60,6 +60,13 @@ def run(name: str, text: str, **settings: object) -> list[str]:
         ("sinumerik", "DEF REAL _X=2.5, _Y\nG1 X=_X Y=_Y\n", ["2.5 0 0"]),
         ("sinumerik", "DEF INT _N\n_N=2.5\nG1 X=_N\n", ["?*"]),
         ("sinumerik", "R1=1\nID=1 WHENEVER $A_IN[1]==1 DO R1=2\nG1 X=R1\n", ["?*"]),
+        # the last digits decide
+        ("linuxcnc", "G1 X[FIX[ASIN[-.5]]]\n", ["?*"]),
+        ("linuxcnc", "G1 X[FIX[2.5]] Y[FUP[3]] Z[ROUND[2.5]]\n", ["2 3 3"]),
+        ("linuxcnc", "G1 X[ROUND[SIN[30]]]\n", ["?*"]),
+        ("linuxcnc", "#1=[[0.1+0.2] LE 0.3]\nG1 X#1\n", ["?*"]),
+        ("linuxcnc", "#1=[0.3 MOD 0.1]\nG1 X#1\n", ["?*"]),
+        ("sinumerik", "R1=TRUNC(2.5)\nR2=TRUNC(0.1*3*10)\nG1 X=R1\nX=R2\n", ["2 0 0", "?*"]),
         # branches
         ("linuxcnc", "#1=1\nO1 IF [#1 EQ 1]\nG1 X1\nO1 ELSE\nG1 X2\nO1 ENDIF\nM2\n", ["1 0 0", "?*"]),
         ("linuxcnc", "O1 IF [#5 EQ 1]\nG1 X1\nO1 ENDIF\nG1 Y3\n", ["?*", "?*"]),

@@ -40,6 +40,25 @@ NAMES = {b"N": 7, b"R": 2.5, b"DEEP": True, b"MODE": b"#FAST"}
 
 
 @pytest.mark.parametrize(
+    ("text", "decided"),
+    [("0.1+0.2<=0.3", None), ("0.1+0.2==0.3", None), ("SIN(30)<0.5", None), ("R==2.5", True), ("R<2.50001", True),
+     ("3000000.0<3000000.5", None), ("3000000<3000001", True), ("SIN(30)<0.51", True)],
+)  # fmt: skip
+def test_the_last_digits_of_a_real_decide_nothing(text: str, decided: bool | None) -> None:
+    found = evaluate(text.encode(), lambda name, path: NAMES.get(name))
+    assert isinstance(found, UnknownValue) if decided is None else found is decided
+
+
+@pytest.mark.parametrize(
+    ("value", "x"),
+    [("2.5", 3.0), ("2.4999", 2.0), ("SIN(30)*5", None), ("SIN(30)*4", 2.0)],
+)
+def test_the_last_digits_of_a_real_round_nothing(value: str, x: float | None) -> None:
+    path = body(f"DECL INT k\nk={value}\nLIN {{X k,Y 2,Z 3,A 4,B 5,C 6}}\n").toolpath
+    assert path.position[0, 0] == pytest.approx(x * MM) if x is not None else np.isnan(path.position[0, 0])
+
+
+@pytest.mark.parametrize(
     ("text", "value"),
     [
         ("1+2*3", 7), ("(1+2)*3", 9), ("7/2", 3), ("-7/2", -3), ("7/2.", 3.5), ("2*R-n", -2.0),

@@ -133,7 +133,8 @@ class Motions(Spelling):
         return words
 
     def spline(self) -> None:
-        """Cubic ones that follow each other; in the plane XY."""
+        """Cubic ones that follow each other, in the plane XY, and a motion from there: rs274 forgets where they end
+        with the next change of tools."""
         self.flush()
         if self.modes.plane != 17 or self.modes.timed:
             return self.line()
@@ -141,7 +142,8 @@ class Motions(Spelling):
             ways = [self.word(letter, self.reals.number(self.chance.uniform(-9, 9), 2)) for letter in "IJPQ"]
             words = ways if number == 0 or self.maybe(0.5) else ways[2:]
             self.put(self.code("5"), *self.feed(), *words, *self.targets(self.place(), [0, 1]), plain=True)
-        self.modes.motion = ""
+        self.modes.motion = "1"
+        self.put(self.code("1"), *self.feed(), *self.targets(self.place(), [0, 1]), plain=True)
 
     def lathe(self) -> None:
         """X as a diameter."""

@@ -17,6 +17,8 @@ LONGEST = 400
 DEEPEST = 20
 NEAR = 2e-4
 """Numbers this near to each other and not the same: controls differ in whether they are equal."""
+LAST_DIGITS = 1e-9
+"""Of a value or of 1: so near to a step of a function, and not on it, the last digits of a control decide."""
 
 Lookup = Callable[[str], float]
 """Name of a variable -> its value, NaN where it is not known."""
@@ -27,14 +29,31 @@ def _truth(value: bool) -> float:
 
 
 def _compare(operator: str, a: float, b: float) -> float:
-    if 0 < abs(a - b) < NEAR and operator in ("EQ", "NE"):
+    if 0 < abs(a - b) < (NEAR if operator in ("EQ", "NE") else LAST_DIGITS * max(1.0, abs(a))):
         return math.nan
     return _truth(
         {"EQ": a == b, "NE": a != b, "GT": a > b, "GE": a >= b, "LT": a < b, "LE": a <= b}[operator]
     )
 
 
+def _is_near_step(value: float) -> bool:
+    """Whether a value is beside a whole number by its last digits alone."""
+    return 0 < abs(value - round(value)) < LAST_DIGITS * max(1.0, abs(value))
+
+
+def _stepped(function: Callable[[float], float]) -> Callable[[float], float]:
+    """A function that jumps at whole numbers: NaN where the last digits decide."""
+    return lambda value: math.nan if _is_near_step(value) else function(value)
+
+
+def _rounded(value: float) -> float:
+    halves = round(2.0 * value)
+    return math.nan if halves % 2 and _is_near_step(2.0 * value) else _half_away(value)
+
+
 def _modulo(a: float, b: float) -> float:
+    if _is_near_step(a / b):
+        return math.nan
     rest = math.fmod(a, b)
     return rest + abs(b) if rest < 0 else rest
 
@@ -54,7 +73,7 @@ def _calculate(operator: str, a: float, b: float) -> float:
         case "MOD":
             return _modulo(a, b)
         case "DIV":
-            return float(math.trunc(a / b))
+            return math.nan if _is_near_step(a / b) else float(math.trunc(a / b))
         case "AND":
             return _truth(a != 0 and b != 0)
         case "OR":
@@ -88,7 +107,7 @@ _FUNCTIONS: Mapping[str, Callable[[float], float]] = {
     "SQRT": math.sqrt,
     "EXP": math.exp,
     "LN": math.log,
-    "ROUND": _half_away,
+    "ROUND": _rounded,
 }
 _BRACKETED_LEVELS = {
     **dict.fromkeys(("AND", "OR", "XOR"), 1),
@@ -114,7 +133,11 @@ class ExpressionLanguage:
 
 LINUXCNC = ExpressionLanguage(
     _BRACKETED_LEVELS,
-    {**_FUNCTIONS, "FIX": lambda x: float(math.floor(x)), "FUP": lambda x: float(math.ceil(x))},
+    {
+        **_FUNCTIONS,
+        "FIX": _stepped(lambda x: float(math.floor(x))),
+        "FUP": _stepped(lambda x: float(math.ceil(x))),
+    },
     ("[", "]"),
     True,
 )
@@ -124,8 +147,8 @@ FANUC = ExpressionLanguage(
         **_FUNCTIONS,
         "ASIN": _unless_negative(_FUNCTIONS["ASIN"]),
         "SQR": math.sqrt,
-        "FIX": lambda x: float(math.trunc(x)),
-        "FUP": lambda x: math.copysign(math.ceil(abs(x)), x),
+        "FIX": _stepped(lambda x: float(math.trunc(x))),
+        "FUP": _stepped(lambda x: math.copysign(math.ceil(abs(x)), x)),
     },
     ("[", "]"),
     True,
@@ -140,7 +163,7 @@ SINUMERIK = ExpressionLanguage(
         **dict.fromkeys("+-", 5),
         **dict.fromkeys(("*", "/", "DIV", "MOD"), 6),
     },
-    {**_FUNCTIONS, "TRUNC": lambda x: float(math.trunc(x)), "POT": lambda x: x * x},
+    {**_FUNCTIONS, "TRUNC": _stepped(lambda x: float(math.trunc(x))), "POT": lambda x: x * x},
     ("(", ")"),
     False,
 )

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.languages.krl.data import Declarations
-from postproc.languages.krl.expressions import Value, evaluate
+from postproc.languages.krl.expressions import Value, decided_by_digits, evaluate
 from postproc.languages.krl.lexing import Statement
 from postproc.languages.krl.modal_state import OVERRIDES, ZERO, FrameRegister, ModalState, Record, joined
 from postproc.languages.krl.motion_rows import MotionRows
@@ -193,6 +193,9 @@ class ExecutionContext:
                 "KRL002", f"{shown(name)} has the type {shown(kind)} and gets a value of another type"
             )
         if kind == b"INT":
+            if (halves := round(2.0 * value)) % 2 and decided_by_digits(2.0 * value, float(halves)):
+                why = f"{shown(name)} is a whole number, and the last digits of a REAL decide which one"
+                return UnknownValue("KRL002", why)
             return int(value + 0.5) if value >= 0 else -int(0.5 - value)
         return float(value) if kind == b"REAL" else value
 

@@ -34,6 +34,8 @@ TOKEN = re.compile(
 _NAME = re.compile(NAME + rb"\Z")
 _PART = re.compile(rb"(" + NAME + rb")((?:\[\d{1,18}+\])?+(?:\." + NAME + rb")?+)\Z")
 """A component or an element with an index of digits: most of what is no number and no name."""
+LAST_DIGITS = 1e-6
+"""Of a REAL or of 1: a REAL has 32 bits on the controller, so what is nearer may be the same there, or not."""
 _COMPARISONS = {
     b"==": lambda a, b: a == b, b"<>": lambda a, b: a != b, b"<": lambda a, b: a < b,
     b">": lambda a, b: a > b, b"<=": lambda a, b: a <= b, b">=": lambda a, b: a >= b,
@@ -177,6 +179,8 @@ class _Parser:
                 ordered and isinstance(left, (bool, bytes))
             ):
                 raise self._unknown("it compares values of different kinds")
+            if (isinstance(left, float) or isinstance(right, float)) and decided_by_digits(left, right):
+                raise self._unknown("the last digits of the numbers that it compares decide")
             left = _COMPARISONS[operator](left, right)
         return left
 
@@ -367,6 +371,13 @@ class _Parser:
 def _of_type(result: int | float, *operands: int | float) -> int | float:
     """A result, whose type is as little known as that of its operands."""
     return UntypedNumber(result) if any(isinstance(each, UntypedNumber) for each in operands) else result
+
+
+def decided_by_digits(one: object, other: object) -> bool:
+    """Whether two numbers differ by no more than their last digits."""
+    if not is_number(one) or not is_number(other):
+        return False
+    return 0 < abs(one - other) < LAST_DIGITS * max(1.0, abs(one))
 
 
 def component(value: Value, path: bytes) -> Value | None:
