@@ -199,6 +199,15 @@ def test_errors_are_found_where_the_force_turns(second: float) -> None:
             assert most == pytest.approx(true, rel=0.03, abs=1e-7)
 
 
+def test_the_force_turns_where_motions_start_too() -> None:
+    """Where no ramp is: within each motion it changes evenly, at another rate than in the next."""
+    job = square(0.5 * MM)
+    job = replace(job, force=replace(job.force, ramps=None))
+    division = subdivide(job, correct(job), FREE)
+    turns = RoundedOutput(job, division, np.flatnonzero(division.source == 2)).turns
+    assert [3.0, 0.0] in turns.tolist()
+
+
 def test_no_point_moves_beyond_its_neighbours() -> None:
     job = square(2.0 * MM)
     result = correct(job)
