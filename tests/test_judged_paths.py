@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from judge.cases import CASES, CELL, CUT, OFF, Case, krl, pose, run
+from judge.cases import CASES, CELL, CUT, OFF, Case, krl, lead_in, pose, run
 from judge.cell import Cell
 from judge.force import Field
-from judge.further_cases import FURTHER
+from judge.further_cases import FURTHER, against_the_force
 from judge.judge import judge
 from judge.motion import DEG, MM, from_abc
 from judge.path import Path as Way
@@ -263,3 +263,22 @@ def test_the_written_path(case: Case, tmp_path: Path) -> None:
         assert outcome.exit == 3
     else:
         assert not outcome.failed, f"{outcome.failed} {outcome.message}"
+
+
+@pytest.mark.slow
+def test_verify_agrees_where_the_tool_may_be_at_two_places(tmp_path: Path) -> None:
+    """The correction turns back at the corner, so that the path is square to the tool before and after it: the nearer
+    of both counts, over all of the stretch on which there are two."""
+    outcome = run(Case("corners against the force", against_the_force(0.02)), tmp_path, verify=True)
+    assert outcome.exit == 3
+    assert outcome.verdict is not None
+    assert outcome.verify == pytest.approx(outcome.verdict.after.largest / MM, abs=1e-3)
+
+
+@pytest.mark.slow
+def test_a_lead_in_that_no_points_hold_is_followed_as_near_as_they_can(tmp_path: Path) -> None:
+    """From an arc into a line to the right: 0.043 mm by the points of the corner alone."""
+    outcome = run(Case("lead-in", lead_in(10, 0)), tmp_path)
+    assert outcome.exit == 3
+    assert outcome.verdict is not None
+    assert outcome.verdict.after.largest < 0.033 * MM

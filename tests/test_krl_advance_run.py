@@ -198,3 +198,14 @@ def test_the_output_is_that_of_exact_motions(tmp_path, compensate, text):
         )
     assert numbers[0] == numbers[1]
     assert numbers[0] != numbers[2]
+
+
+def test_what_is_inserted_into_a_motion_is_approximated_as_the_program_states() -> None:
+    """With C_DIS, from $APO.CDIS on: in bulk or alone, of lines and arcs, of motions that end exactly as well."""
+    text = "$APO.CDIS=2\n" + LINE.format(0).replace(" C_DIS", "") + "$APO.CDIS=0.5\n" + LINE.format(10) * 3
+    text += "LIN {X 40,Y 0,Z 5}\nLIN {X 40,Y 1,Z 5,A 0,B 0,C 180}\n"
+    stated = read(text).toolpath.constraints.inserted_approximation
+    assert stated == pytest.approx([0.002, *[0.0005] * (len(stated) - 1)])
+    assert len(stated) == 6
+    stopped = read("$APO.CDIS=2\n$ADVANCE=0\n" + LINE.format(0)).toolpath.constraints.inserted_approximation
+    assert stopped == pytest.approx([0.0])

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 from test_corner_fit import ALONG, FREE, square, two_sides
 
@@ -158,6 +159,27 @@ def test_what_no_points_hold_is_as_near_as_can_be(turn: float, monkeypatch: pyte
     assert errors[0] <= errors[1]
 
 
+@pytest.mark.parametrize(("beside", "bound"), [(0, 0.419), (1, 0.356), (5, 0.340)])
+def test_no_number_of_points_follows_a_turn_nearer_than_their_distance_lets_them(
+    beside: int, bound: float
+) -> None:
+    """Of max(x, 0) by polygons of points h = 1 apart, rounded off from half of that on, ``beside`` points on each side
+    of the turn free: the least largest error by a linear programme, in parts of k h / 8."""
+    found = []
+    for shift in (0.0, 0.25, 0.5):
+        points = np.arange(-beside - 2, beside + 3) + shift
+        x = np.linspace(-beside - 1.0, beside + 1.0, 160 * (beside + 1) + 1)
+        away = np.abs(x[:, None] - points)
+        basis = np.where(away <= 0.5, 0.75 - away**2, 0.5 * np.clip(1.5 - away, 0.0, None) ** 2)
+        free = np.abs(points - shift) < beside + 0.5
+        off = np.maximum(x, 0.0) - basis[:, ~free] @ np.maximum(points[~free], 0.0)
+        both = np.vstack([basis[:, free], -basis[:, free]])
+        rows = np.hstack([both, -np.ones((len(both), 1))])
+        cost = np.append(np.zeros(int(free.sum())), 1.0)
+        found.append(linprog(cost, rows, np.append(off, -off), bounds=(None, None)).fun)
+    assert 8.0 * min(found) == pytest.approx(bound, abs=2e-3)
+
+
 def test_more_points_are_needed_only_for_more() -> None:
     errors = [
         fitted(0.5, 2.0 * MM, *start)[1] for start in [(0.0, END), (0.0, 0.5 * MM, END - 0.5 * MM, END)]
@@ -197,6 +219,15 @@ def test_errors_are_found_where_the_force_turns(second: float) -> None:
             share = np.linspace(0.0, 1.0, 3001)
             true = np.linalg.norm(output.deviations(np.repeat(at, len(share)), share).shift, axis=1).max()
             assert most == pytest.approx(true, rel=0.03, abs=1e-7)
+
+
+def test_the_force_turns_where_motions_start_too() -> None:
+    """Where no ramp is: within each motion it changes evenly, at another rate than in the next."""
+    job = square(0.5 * MM)
+    job = replace(job, force=replace(job.force, ramps=None))
+    division = subdivide(job, correct(job), FREE)
+    turns = RoundedOutput(job, division, np.flatnonzero(division.source == 2)).turns
+    assert [3.0, 0.0] in turns.tolist()
 
 
 def test_no_point_moves_beyond_its_neighbours() -> None:

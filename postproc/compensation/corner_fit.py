@@ -66,20 +66,20 @@ def fit_corners(
     least = {} if least is None else least
     if task.gain != 1.0:
         return result, division
-    *plain, rows = _fit_all(task, result, division, limits, least, np.empty(0, np.int64))
+    fit, plain, rows = _fit_all(task, result, division, limits, least, np.empty(0, np.int64))
     if not len(rows):
-        return plain[0], plain[1]
+        return fit, plain
     # what no points hold: those that come nearest to the ramps, or those of the corners alone
-    before = _near_ramps(task, plain[1], rows)
+    before = _near_ramps(task, plain, rows)
     for _ in range(2):
-        *other, _ = _fit_all(task, result, division, limits, least, rows)
-        better = _near_ramps(task, other[1], rows) < BETTER * before
+        nearest, other, _ = _fit_all(task, result, division, limits, least, rows)
+        better = _near_ramps(task, other, rows) < BETTER * before
         if better.all():
-            return other[0], other[1]
+            return nearest, other
         if not better.any():
             break
         rows, before = rows[better], before[better]
-    return plain[0], plain[1]
+    return fit, plain
 
 
 def _near_ramps(task: CompensationProblem, division: Subdivision, rows: Ints) -> Floats:

@@ -346,7 +346,8 @@ class _Solution:
             above[some] = np.minimum(at[some] + 1 + wider, self.high[rows] + 1)
             one[some], two[some] = self._at(rows, below[some]), self._at(rows, above[some])
             enclosed[some] = (one[some] >= 0) & (two[some] <= 0)
-        self._between(*(values[enclosed] for values in (active, below, above, one, two)))
+        below, above, one, two = (values[enclosed] for values in (below, above, one, two))
+        self._between(active[enclosed], below, above, one, two)
 
     def _between(self, active: Ints, below: Floats, above: Floats, one: Floats, two: Floats) -> None:
         """Places between those ``below``, of which the tools are ``one`` (K,) [m] ahead, and those ``above``:
@@ -369,9 +370,8 @@ class _Solution:
                 np.where(is_ahead, 1, -1),
             )
             going = ~self.settled[active] & np.isfinite(ahead)
-            active, below, above, one, two, side = (
-                values[going] for values in (active, below, above, one, two, side)
-            )
+            active, side = active[going], side[going]
+            below, above, one, two = (values[going] for values in (below, above, one, two))
 
     def _at(self, active: Ints, place: Floats) -> Floats:
         """How far the tools are ahead of these places: numbers of intervals, with their parts after the point."""

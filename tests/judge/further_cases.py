@@ -61,14 +61,15 @@ def waiting(*between: str) -> Callable[[Path], Path]:
     )  # fmt: skip
 
 
-def against_the_force(last: str) -> Callable[[Path], Path]:
+def against_the_force(tolerance: float) -> Callable[[Path], Path]:
     """Corners to the right, where the force of the feed frame pushes the tool to the left: its correction turns back
-    as the path turns on, as fast as the shortest motions can follow within 0.05 mm."""
+    as the path turns on, as fast as the shortest motions can follow within 0.05 mm, not within 0.02."""
     corners = [(0, 0), (100, 0), (100, -80)]
     return krl(
         f"LIN {pose(0, -60, 40)}", f"LIN {pose(0, -60, -5)}", CUT,
-        *(f"LIN {pose(x, y, -5)} C_DIS" for x, y in corners), f"LIN {pose(0, -80, -5)} {last}".strip(), OFF,
-        f"LIN {pose(0, -80, 50)}", cell=CELL.replace("tolerance: 0.02", "tolerance: 0.05"), head=("$APO.CDIS=0.5",),
+        *(f"LIN {pose(x, y, -5)} C_DIS" for x, y in corners), f"LIN {pose(0, -80, -5)}", OFF,
+        f"LIN {pose(0, -80, 50)}", cell=CELL.replace("tolerance: 0.02", f"tolerance: {tolerance}"),
+        head=("$APO.CDIS=0.5",),
     )  # fmt: skip
 
 
@@ -110,7 +111,7 @@ FURTHER: list[Case] = [
     Case("closed, C_DIS 2", contour([(100, 0), (100, 60), (0, 60), (0, 0)], "C_DIS", 2)),
     Case("corners, stops of the advance run", waiting("WAIT SEC 0", "$OUT[3]=TRUE", "CONTINUE\n$OUT[3]=FALSE")),
     Case("corners, C_VEL", contour(SQUARE, "C_VEL", 0.5)),
-    Case("corners against the force", against_the_force("")),
+    Case("corners against the force", against_the_force(0.05)),
     Case("399 short motions", short_motions()),
     Case("force steps between arcs, C_DIS", half_circle("C_DIS")),
     Case("force steps between arcs, exact", half_circle("")),
