@@ -181,7 +181,7 @@ def test_an_output_named_like_its_companion(compensate, job):
     (job.folder / "part.dat").write_text("DEFDAT part\nENDDAT\n")
     done = compensate(job.program, "--force", "-o", job.folder / "new" / "other.dat")
     assert done.code == 1
-    assert "FIL014" in done.err
+    assert "FIL007" in done.err
     assert not (job.folder / "new").exists()
 
 

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
 import pytest
 from conftest import LINES
+
+SAMPLES = Path(__file__).resolve().parent.parent / "samples"
 
 CUT = LINES.index(";FORCE -360 50 560 @base")
 OFF = LINES.index(";FORCE OFF")
@@ -90,3 +95,18 @@ def test_comments_that_only_end_a_force_state_none(compensate, job):
     assert done.json["force"]["max_n"] == pytest.approx(665.7, abs=0.1)
     stated = compensate(job.program, "--force=0,360,560", "--dry-run", "--json", "-")
     assert 0 < done.json["corrected"] < stated.json["corrected"]
+
+
+@pytest.mark.parametrize(
+    "name", ["irb6700_pocket/pocket.mod", "m900ib_pocket/pocket.ls", "kr270_pocket/pocket.ngc"]
+)
+def test_in_every_language(compensate, tmp_path, name):
+    folder = tmp_path / "sample"
+    shutil.copytree((SAMPLES / name).parent, folder)
+    program = folder / Path(name).name
+    raw = program.read_bytes()
+    program.write_bytes(raw.replace(b"FORCE 120", b"FORSE 120", 1))
+    done = compensate(program, "--force")
+    assert done.code == 1
+    assert f":{raw[: raw.index(b'FORCE 120')].count(10) + 1} FRC002 'FORSE 120 260 -60" in done.err
+    assert not (folder / "compensated").exists()

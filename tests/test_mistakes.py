@@ -56,6 +56,8 @@ TOOL = "{x: 120, y: 0, z: 250, a: 0, b: 30, c: 0, axis: +z}"
 BASE = "{x: 1500, y: -200, z: 600, a: 0, b: 0, c: 0}"
 RUN = (P, f"--force={FORCE}", "--dry-run")
 
+PLAN = ("plan", "--robot", "kuka_kr270", "--effects", "joint_compliance", "--poses", "5", "-o", "p.csv")
+
 MISTAKES = [
     # forces
     Mistake("a folder", [], [".", f"--force={FORCE}"], 1, ["FIL001", "this is a folder", "compensate batch ."]),
@@ -192,6 +194,10 @@ MISTAKES = [
             ["MEA013", "this is a program (krl)", "name the program first"]),
     Mistake("name no module has", [], [P, f"--force={FORCE}", "-o", "1 part.src"], 1, ["cannot name a KRL module"]),
     Mistake("JSON in a folder", [], [*RUN, "--json", "."], 2, ["must end in .json"]),
+    Mistake("program as $config.dat", [], [*RUN, "--config-dat", P], 1, ["no data list of a controller", "DEFDAT"]),
+    Mistake("pattern as program", [], ["*.src", "--force"], 1, ["this is a pattern", "compensate batch '*.src'"]),
+    Mistake("loads in grams", [], [*PLAN, "--loads", "100000"], 1, ["PLN006", "is it in grams?"]),
+    Mistake("help as a command", [], ["help"], 2, ["see compensate --help"]),
     Mistake("batch of nothing", [], ["batch", "nothing"], 1, ["matches nothing"]),
     Mistake("verify one file", [], ["verify", P], 2, ["COMPENSATED"]),
 ]  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +20,12 @@ PLAN = (
     *("--tool", "0,500,300"),
 )
 MAP = ("map", "--robot", "kuka_kr270", "--x", "800:2200", "--y=-1000:1000", "--z", 500, "--grid", 8)
-KINDS = ("program", "prediction", "batch", "check", "verify", "plan", "map", "curve", "learn")
-SECOND_PART = Path(__file__).resolve().parent.parent / "samples" / "kr270_second_part"
+KINDS = (
+    *("program", "prediction", "batch", "check", "verify", "plan", "map", "curve", "learn"),
+    *("place", "identify", "diagnose"),
+)
+ROOT = Path(__file__).resolve().parent.parent
+SECOND_PART = ROOT / "samples" / "kr270_second_part"
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +69,12 @@ def pages(tmp_path_factory):
     part = folder / "second_part"
     shutil.copytree(SECOND_PART, part)
     called("learn", part / "part.src", part / "part1.csv", "--page", found["learn"])
+    called("place", program, "--force", "--x", "1400:1600", "--y=-300:-100", "--page", found["place"])
+    loads = ROOT / "samples" / "kr270_campaign" / "loads.csv"
+    called("identify", loads, "--effects", "joint_compliance", "--page", found["identify"])
+    plain = ROOT / "samples" / "kr270_missing_compensator"
+    robot = ("--robot", plain / "kr270_plain.yaml")
+    called("diagnose", plain / "loads.csv", *robot, "--page", found["diagnose"])
     return found
 
 
@@ -71,7 +82,7 @@ def pages(tmp_path_factory):
 @pytest.mark.parametrize("kind", KINDS)
 def test_narrow_and_wide_light_and_dark(window, pages, kind):
     """Nothing is wider than the window, axe-core finds nothing, the ground is that of the scheme."""
-    for wide, scheme in ((390, "dark"), (1400, "light")):
+    for wide, scheme in product((390, 1400), ("light", "dark")):
         size = {"width": wide, "height": 800}
         shown = window(pages[kind], viewport=size, color_scheme=scheme, bypass_csp=True)
         shown.page.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true; })")
@@ -87,7 +98,7 @@ def test_narrow_and_wide_light_and_dark(window, pages, kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["program", "prediction", "map", "learn"])
+@pytest.mark.parametrize("kind", ["program", "prediction", "map", "learn", "place"])
 def test_on_paper_the_picture_is_there(window, pages, kind):
     """Of a dark screen: the ground is white, and the first picture has ink of more than one colour."""
     pdfium = pytest.importorskip("pypdfium2", reason="pypdfium2 is not installed")
@@ -99,7 +110,7 @@ def test_on_paper_the_picture_is_there(window, pages, kind):
         assert np.median(image) > 250
         coloured = (image.max(axis=2) - image.min(axis=2)) > 60
         inked.append(coloured)
-    if kind in ("map", "learn"):
+    if kind in ("map", "learn", "place"):
         assert max(one.sum() for one in inked) > (5000 if kind == "map" else 2000)
         return
     # the path, in the colours of its scale: dark violet and green, which no chart has

@@ -85,6 +85,8 @@ def _read(path: Path, largest: int | None, take: Callable[[BinaryIO, int], bytes
 
 def _similar(path: Path) -> str:
     """A help that names the file whose name is nearest to that of ``path``; "" where none is near."""
+    if "*" in path.name or "?" in path.name:
+        return f"this is a pattern: compensate batch '{path}' compensates all programs that it matches"
     try:
         names = [one.name for one in path.parent.iterdir() if one.is_file()]
     except OSError:

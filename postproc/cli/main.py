@@ -99,7 +99,7 @@ def run(argv: Sequence[str] | None = None) -> None:
 
 def _run(words: list[str], and_exits: bool) -> None:
     if words and words[0].isalpha() and words[0] not in COMMANDS and not os.path.exists(words[0]):
-        hint = nearest(words[0], COMMANDS)
+        hint = "; see compensate --help" if words[0].lower() == "help" else nearest(words[0], COMMANDS)
         click.echo(f"Error: neither a command nor an existing file has the name {words[0]!r}{hint}", err=True)
         raise SystemExit(2)
     with ended_in_words(and_exits):

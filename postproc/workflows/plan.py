@@ -55,6 +55,9 @@ SHARE, SIZE_SHARE = 0.05, 0.2
 CUTS = 300
 """Motions of a program at which the error counts."""
 
+HEAVIEST = 3000.0
+"""[kg] No robot carries more."""
+
 CLEAR = 3.0
 """Standard deviations that distinguish two effects."""
 
@@ -278,6 +281,9 @@ def _candidate_setups(
     )
     deflection = request.kind == "deflection" if request.kind else _by_load(model, unknowns)
     loads = sorted(set(request.loads) - ({0.0} if deflection else set()))
+    if loads and loads[-1] > HEAVIEST:
+        message = f"no robot carries a load of {loads[-1]:g} kg; is it in grams?"
+        raise Refusal(Finding("PLN006", message, str(robot.path), help="loads are in kg"))
     if deflection and not loads:
         raise Refusal(
             Finding(

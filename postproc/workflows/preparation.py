@@ -41,6 +41,7 @@ from postproc.toolpath import Toolpath
 from postproc.workflows.cell_force_factors import factored
 from postproc.workflows.cell_tool_errors import cell_tool_displacement
 from postproc.workflows.correction_mode import corrected_model, mode_findings, temperature_rise, touch_off
+from postproc.workflows.kinds import read_controller_data
 from postproc.workflows.ramp_lengths import early_shares, ramp_lengths
 from postproc.workflows.reading_findings import configuration_findings, reader_findings, start_findings
 
@@ -137,7 +138,7 @@ def read_program(
     documents = (main, *(read_document(companion) for companion in companions))
     if config_dat is None and cell is not None and cell.config_dat is not None:
         config_dat = cell.path.parent / cell.config_dat
-    references = () if config_dat is None else (read_document(config_dat),)
+    references = () if config_dat is None else (read_controller_data(config_dat),)
     settings = ReadingSettings(references=references)
     if cell is not None:
         stated = cell.orientation, cell.integer_words, references, (), cell.symbols, cell.program_start

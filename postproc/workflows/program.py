@@ -122,7 +122,6 @@ def _compensate(request: Request, stage: Stage) -> Report:
     refuse_without_force(request, ready)
     stage("correcting")
     target = _target(request)
-    _refuse_suffix(target, ready)
     excluded: dict[int, Finding] = {}
     least: dict[tuple[int, float], int] = {}
     while True:
@@ -181,6 +180,7 @@ def _compensate(request: Request, stage: Stage) -> Report:
         table = correction_table(task, result, written.division, written.path_error)
         report = replace(report, motion_table=table)
     _not_over_inputs(ready, report.outputs)
+    _refuse_suffix(target, ready)
     if request.dry_run:
         return replace(report, outputs=())
     diff = chain.from_iterable(
