@@ -215,7 +215,7 @@ def turn_to_robot_axes(
     if largest > MOST:
         message = f"{source}: no robot carries a force of {largest:.3g} N (or N m)"
         raise Refusal(Finding("FRC002", message, file, help="state forces in N and moments in N m"))
-    if 0 < largest < LEAST:
+    if 0 < largest < LEAST and stated.stock is None:  # what a stock computes is in N
         message = f"the largest force is {largest:.3g} N (or N m), as if it were in kN"
         help = f"forces are in N: in kN this would be {1000 * largest:.3g}"
         findings = (*findings, Finding("FRC034", message, file, help=help))
