@@ -261,3 +261,14 @@ def test_each_offence_is_told(tmp_path, file, text, word):
     told = offences(house)
     assert len(told) >= 1
     assert any(word in line for line in told)
+
+
+def test_suffixes_of_a_language_are_known_to_it_alone():
+    named = {
+        path.relative_to(ROOT).as_posix()
+        for path in sorted(ROOT.rglob("*.py"))
+        for node in walk(parse_file(path))
+        if isinstance(node, ast.Constant) and node.value in (".src", ".dat")
+    }
+    assert named
+    assert all(name.startswith(("languages/krl/", "posts/")) for name in named), named

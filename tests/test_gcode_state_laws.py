@@ -263,22 +263,22 @@ def walked(way: AxisWords, events: list[int]) -> tuple[Floats, Floats, Ints, Int
     begins, ends, sources, frames = [], [], [], []
     for k in range(n):
         if k in events:
-            here = np.where(way.left[k], NAN, here)
+            here = np.where(way.unknown_before[k], NAN, here)
             there = frame.to_base(here)
             frame = change(k, frame, there)
             here, number = frame.from_base(there), number + 1
             origin = np.where(np.isnan(here), k, origin)
-        begins.append(np.where(way.left[k], NAN, here))
+        begins.append(np.where(way.unknown_before[k], NAN, here))
         after = here.copy()
         for axis in range(6):
             value = way.value[k, axis]
             if way.sets[k, axis]:
                 after[axis] = NAN if way.unknown[k, axis] else value
-            elif way.unknown[k, axis] or way.left[k, axis]:
+            elif way.unknown[k, axis] or way.unknown_before[k, axis]:
                 after[axis] = NAN
             elif way.adds[k, axis]:
                 after[axis] += value
-            told = way.sets[k, axis] or way.unknown[k, axis] or way.left[k, axis]
+            told = way.sets[k, axis] or way.unknown[k, axis] or way.unknown_before[k, axis]
             if told or (way.adds[k, axis] and np.isnan(value)):
                 origin[axis] = k
         here = after

@@ -88,6 +88,16 @@ def test_what_has_no_value_is_unclear(text: str) -> None:
 six = st.tuples(*[st.floats(-500, 500)] * 3, *[st.floats(-180, 180)] * 3)
 
 
+@settings(deadline=None, max_examples=examples(40))
+@given(six, st.tuples(*[st.floats(-500, 500)] * 3))
+def test_a_frame_that_is_shifted_keeps_its_angles_to_the_last_bit(
+    first: tuple[float, ...], shift: tuple[float, ...]
+) -> None:
+    """Also those beyond 180 deg, and A and C where B is 90 deg, which the rotation does not determine."""
+    for angles_ in (first[3:], (first[3] + 360.0, *first[4:]), (first[3], 90.0, first[5])):
+        assert product((*first[:3], *angles_), (*shift, 0.0, 0.0, 0.0))[3:] == angles_  # type: ignore[arg-type]
+
+
 @settings(deadline=None, max_examples=examples(60))
 @given(six, six)
 def test_the_product_of_frames_is_that_of_their_poses(

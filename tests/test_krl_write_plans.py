@@ -170,6 +170,18 @@ def test_a_point_of_two_inline_forms_gets_a_new_point_in_the_dat() -> None:
     ]
 
 
+@pytest.mark.parametrize("at", range(1, 5))
+def test_nothing_is_inserted_before_a_form_that_sets_another_base(at: int) -> None:
+    """Wherever the fold has a comment of its own: what holds before the form holds at its first line."""
+    lines = FORM.splitlines(keepends=True)
+    text = "".join([*lines[:at], ";checked by the shift\n", *lines[at:]])
+    same, other = (read(text, POINT + RECORDS.replace("BASE_NO 1", f"BASE_NO {number}")) for number in (1, 2))
+    assert not same.toolpath.constraints.no_insert_before
+    assert other.toolpath.constraints.no_insert_before == {
+        0: "it is an inline form that sets another base or tool"
+    }
+
+
 def test_a_relative_motion_behind_a_moved_point_ends_where_it_did() -> None:
     program = read(START + "LIN_REL {Z 10.25} #BASE C_DIS ;up\nLIN_REL {X 1}\n")
     lines, _ = written(program, plan(program, r0=(0.5, 0, 0)))

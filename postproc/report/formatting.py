@@ -94,3 +94,13 @@ def millimetres(length: float) -> str:
     if length < 1e-4 * MM:
         return "0.0001"
     return f"{length / MM:.3f}" if length >= 0.01 * MM else f"{length / MM:.2g}"
+
+
+def known(value: float, decimals: int = 7) -> float | None:
+    """A figure of a result, rounded; None where it is not finite."""
+    return round(value, decimals) if math.isfinite(value) else None
+
+
+def known_mm(length: float) -> float | None:
+    """A length [m] of a result in mm; None where it is not finite."""
+    return known(length / MM)

@@ -9,7 +9,7 @@ import numpy as np
 from postproc.base.units import MM
 from postproc.compensation.uncertainty import Uncertainty
 from postproc.part.part_figures import CutForces, ErrorFigures, PartFigures, SideFigures, SurfaceGroup
-from postproc.report.formatting import two_digits
+from postproc.report.formatting import known_mm, two_digits
 
 SIDES = {"before": "part before", "after": "part after"}
 
@@ -18,9 +18,9 @@ def part_json(part: PartFigures) -> dict[str, object]:
     """The key ``part_error_mm``; lengths in mm, areas in mm2, excess above zero."""
     return {
         "points": part.points,
-        "spacing": _mm(part.spacing),
+        "spacing": known_mm(part.spacing),
         "area_mm2": round(part.area / MM**2, 3),
-        "tolerance": _mm(part.tolerance),
+        "tolerance": known_mm(part.tolerance),
         "before": _side(part.before),
         "after": None if part.after is None else _side(part.after),
         "features": _groups(part.features),
@@ -37,20 +37,16 @@ def _forces(side: CutForces) -> dict[str, object]:
         "reason": side.nominal or None,
         "force_max_n": None if force is None else round(force, 6),
         "nominal_force_max_n": round(side.force_nominal, 6),
-        "residual": None if side.residual is None else _mm(side.residual),
+        "residual": None if side.residual is None else known_mm(side.residual),
     }
-
-
-def _mm(length: float) -> float | None:
-    return round(length / MM, 7) if np.isfinite(length) else None
 
 
 def _errors(figures: ErrorFigures) -> dict[str, float | None]:
     return {
-        "gouge_max": _mm(figures.gouge_max),
-        "excess_max": _mm(figures.excess_max),
-        "rms": _mm(figures.rms),
-        "p95": _mm(figures.p95),
+        "gouge_max": known_mm(figures.gouge_max),
+        "excess_max": known_mm(figures.excess_max),
+        "rms": known_mm(figures.rms),
+        "p95": known_mm(figures.p95),
         "out_of_tolerance": round(figures.out, 6),
     }
 
@@ -59,12 +55,12 @@ def _side(side: SideFigures) -> dict[str, object]:
     worst = side.worst
     return {
         **_errors(side.whole),
-        "ci95": _mm(side.ci95),
+        "ci95": known_mm(side.ci95),
         "worst": {
             "line": worst.line or None,
-            "error": _mm(worst.error),
+            "error": known_mm(worst.error),
             "feature": worst.feature,
-            "position": [_mm(value) for value in worst.position],
+            "position": [known_mm(value) for value in worst.position],
         },
     }
 

@@ -16,7 +16,7 @@ from postproc.base.arrays import Floats
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
 from postproc.placement.room import FREEDOMS, UNITS, Room
-from postproc.report.formatting import in_decimals
+from postproc.report.formatting import in_decimals, known, known_mm
 from postproc.report.placement_spin import WORTH as SPIN_WORTH
 from postproc.report.placement_spin import SpinFigures, spin_sentence
 from postproc.report.report import Spread
@@ -109,15 +109,15 @@ class PlacedFigures:
     def as_json(self) -> dict[str, object]:
         return {
             **self.coordinates(),
-            "score_mm": _mm(self.score),
+            "score_mm": known_mm(self.score),
             "error_mm": self.error.as_mm(),
             "across_feed_mm": self.across.as_mm(),
-            "uncertainty_mm": _mm(self.uncertainty),
-            "limit_margin_deg": _known(self.limit_deg, 3),
+            "uncertainty_mm": known_mm(self.uncertainty),
+            "limit_margin_deg": known(self.limit_deg, 3),
             "limit_margin_line": self.limit_line,
-            "singularity_margin_deg": _known(self.singular_deg, 3),
+            "singularity_margin_deg": known(self.singular_deg, 3),
             "singularity_margin_line": self.singular_line,
-            "regret": _known(self.regret, 4),
+            "regret": known(self.regret, 4),
             "exact": self.exact,
         }
 
@@ -227,10 +227,10 @@ class Placement(Result):
             "direction_deg": self.direction,
             "present": self.present.as_json(),
             "best": self.best.as_json(),
-            "reduction": _known(self.reduction, 5),
+            "reduction": known(self.reduction, 5),
             "places": [one.as_json() for one in self.places],
             "alone": {
-                one.name: {"value": _known(one.value / _unit(one.name), 4), "ratio": _known(one.ratio, 4)}
+                one.name: {"value": known(one.value / _unit(one.name), 4), "ratio": known(one.ratio, 4)}
                 for one in self.alone
             },
             "feed_turns": [
@@ -239,13 +239,13 @@ class Placement(Result):
                     "operation": one.operation,
                     "first_line": one.first,
                     "last_line": one.last,
-                    "before_mm": _mm(one.before),
+                    "before_mm": known_mm(one.before),
                     "turn_deg": round(one.angle / DEG, 3),
-                    "after_mm": _mm(one.after),
+                    "after_mm": known_mm(one.after),
                 }
                 for one in self.feed
             ],
-            "spin_bound_mm": _mm(self.spin),
+            "spin_bound_mm": known_mm(self.spin),
             "spin": None if self.spun is None else self.spun.as_json(),
             "findings": [finding.as_json() for finding in self.findings],
             "outputs": list(self.outputs),
@@ -270,14 +270,6 @@ class Placement(Result):
 
 def _unit(name: str) -> float:
     return float(UNITS[FREEDOMS.index(name)])
-
-
-def _mm(length: float) -> float | None:
-    return _known(length / MM, 7)
-
-
-def _known(value: float, decimals: int) -> float | None:
-    return round(value, decimals) if math.isfinite(value) else None
 
 
 def show_placement(console: Console, done: Placement, verbose: bool = False) -> None:

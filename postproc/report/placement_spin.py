@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from postproc.base.units import DEG, MM
+from postproc.report.formatting import known
 from postproc.report.report import Spread
 
 WORTH = 0.95
@@ -44,14 +45,14 @@ class SpinFigures:
         return {
             "worth": self.worth,
             "reason": self.reason,
-            "before_mm": _known(self.before / MM),
-            "after_mm": _known(self.after / MM),
-            "bound_mm": _known(self.bound / MM),
-            "gain": _known(self.gain),
+            "before_mm": known(self.before / MM),
+            "after_mm": known(self.after / MM),
+            "bound_mm": known(self.bound / MM),
+            "gain": known(self.gain),
             "error_mm": self.error.as_mm(),
             "turn_deg": [round(end / DEG, 3) for end in self.turn],
-            "deg_per_mm": _known(self.per_length * MM / DEG),
-            "deg_per_s": _known(self.per_time / DEG),
+            "deg_per_mm": known(self.per_length * MM / DEG),
+            "deg_per_s": known(self.per_time / DEG),
             "motions": self.motions,
         }
 
@@ -67,7 +68,3 @@ def spin_sentence(spin: SpinFigures) -> str:
         f" at most {spin.per_length * MM / DEG:.2f} deg/mm"
         + (f" and {spin.per_time / DEG:.0f} deg/s" if math.isfinite(spin.per_time) else "")
     )
-
-
-def _known(value: float) -> float | None:
-    return round(value, 7) if math.isfinite(value) else None

@@ -15,6 +15,7 @@ from postproc.base.units import MM
 from postproc.compensation.path_comparison import Transitions
 from postproc.compensation.uncertainty import Uncertainty
 from postproc.part.part_figures import PartFigures
+from postproc.report.formatting import known, known_mm
 from postproc.report.part_report import part_json
 from postproc.report.result import Columns, Result
 from postproc.report.result_keys import complete_result
@@ -42,7 +43,7 @@ class Spread:
 
     def as_mm(self) -> dict[str, float | None]:
         values = {"max": self.max, "rms": self.rms, "p95": self.p95}
-        return {key: round(v / MM, 7) if np.isfinite(v) else None for key, v in values.items()}
+        return {key: known_mm(value) for key, value in values.items()}
 
 
 @dataclass(frozen=True)
@@ -89,13 +90,13 @@ class PathFigures:
             "across_feed_mm": {"before": self.across_before.as_mm(), "after": self.across_after.as_mm()},
             "force_ramp_mm": round(self.ramp / MM, 6),
             "force_ramps": self.ramps,
-            "force_ramp_max": {"mm": _finite(self.longest_ramp / MM), "line": self.longest_ramp_line},
+            "force_ramp_max": {"mm": known(self.longest_ramp / MM), "line": self.longest_ramp_line},
             "lead_ins": transitions.lead_ins,
             "stops_added": transitions.stops,
             "backwards": transitions.backwards,
             "correction_rate": {
-                "mm_per_mm": _finite(transitions.rate),
-                "mm_per_s": _finite(transitions.speed / MM),
+                "mm_per_mm": known(transitions.rate),
+                "mm_per_s": known(transitions.speed / MM),
                 "line": transitions.rate_line,
             },
         }
@@ -206,27 +207,25 @@ class Report(Result):
             "force": {
                 "source": self.force_source,
                 "max_n": round(self.force_max_n, 3),
-                "peak_n": _finite(round(self.force_peak_n, 3)),
+                "peak_n": known(round(self.force_peak_n, 3)),
             },
-            "error_before_mm": {**self.before.as_mm(), "ci95": _finite(self.uncertainty.before / MM)},
+            "error_before_mm": {**self.before.as_mm(), "ci95": known(self.uncertainty.before / MM)},
             "largest_error_mm": {
-                "before": _finite(self.largest_before / MM),
-                "after": None if self.after is None else _finite(self.largest_after / MM),
+                "before": known(self.largest_before / MM),
+                "after": None if self.after is None else known(self.largest_after / MM),
             },
-            "error_after_mm": {**self.after.as_mm(), "ci95": _finite(self.uncertainty.after / MM)}
+            "error_after_mm": {**self.after.as_mm(), "ci95": known(self.uncertainty.after / MM)}
             if self.after
             else None,
             "path_error_mm": self.path_error.as_mm() if self.path_error else None,
             **(self.path.as_json() if self.path else {}),
             "correction_mm": self.correction.as_mm() if self.correction else None,
-            "angle_before_deg": {"max": _finite(self.angle_before_deg)},
-            "angle_after_deg": None
-            if self.angle_after_deg is None
-            else {"max": _finite(self.angle_after_deg)},
-            "path_error_deg": None if self.path_error_deg is None else {"max": _finite(self.path_error_deg)},
+            "angle_before_deg": {"max": known(self.angle_before_deg)},
+            "angle_after_deg": None if self.angle_after_deg is None else {"max": known(self.angle_after_deg)},
+            "path_error_deg": None if self.path_error_deg is None else {"max": known(self.path_error_deg)},
             "part_error_mm": None if self.part is None else part_json(self.part),
             "uncertainty": self._uncertainty(),
-            "tolerance_mm": _finite(self.tolerance / MM),
+            "tolerance_mm": known(self.tolerance / MM),
             "verdict": self.verdict,
             "model": self.model,
             "digests": self.digests,
@@ -245,12 +244,12 @@ class Report(Result):
         return {
             "known": not uncertainty.unknown,
             "lower_bound": uncertainty.lower_bound,
-            "before_mm": _finite(uncertainty.before / MM),
-            "after_mm": None if after is None else _finite(uncertainty.after / MM),
-            "bound_after_mm": _finite(bound / MM),
+            "before_mm": known(uncertainty.before / MM),
+            "after_mm": None if after is None else known(uncertainty.after / MM),
+            "bound_after_mm": known(bound / MM),
             "budget": [{"parameter": name, "share": round(share, 6)} for name, share in uncertainty.budget],
             "effect_of_10_percent_mm": {
-                name: _finite(length / MM) for name, length in uncertainty.effect_of_10_percent
+                name: known(length / MM) for name, length in uncertainty.effect_of_10_percent
             },
             "without_interval": [name for name, _ in uncertainty.effect_of_10_percent],
             "level_unstated": list(uncertainty.level_unstated),
@@ -285,10 +284,6 @@ def failure(command: str, program: str, findings: Sequence[Finding]) -> dict[str
 def in_order_of_place(findings: Sequence[Finding]) -> tuple[Finding, ...]:
     """By file and line, each once."""
     return tuple(sorted(dict.fromkeys(findings), key=lambda f: (f.file, f.line, f.column, f.code)))
-
-
-def _finite(value: float) -> float | None:
-    return round(value, 7) if np.isfinite(value) else None
 
 
 def json_bytes(result: Jsonable) -> bytes:

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
-from postproc.report.formatting import in_decimals
+from postproc.report.formatting import in_decimals, known
 from postproc.report.report import REVIEW, WITHIN, Spread
 from postproc.report.result import Columns, Result, columns_of
 from postproc.report.result_keys import complete_result
@@ -70,10 +70,10 @@ class PathComparison:
             **self.error.as_mm(),
             "samples": self.samples,
             "converged": self.converged,
-            "orientation_deg": _rounded(self.turn / DEG),
-            "missed": _rounded(self.missed / MM),
-            "cut_ends": {**self.ends.as_mm(), "along": _rounded(self.along_at_ends / MM)},
-            "doubling": {"mm": _rounded(self.change / MM), "deg": _rounded(self.change_turn / DEG)},
+            "orientation_deg": known(self.turn / DEG),
+            "missed": known(self.missed / MM),
+            "cut_ends": {**self.ends.as_mm(), "along": known(self.along_at_ends / MM)},
+            "doubling": {"mm": known(self.change / MM), "deg": known(self.change_turn / DEG)},
             "stops": self.stops,
             "backwards": self.backwards,
             "approaches": {"count": self.approaches, "length_mm": round(self.approach_length / MM, 3)},
@@ -265,7 +265,3 @@ def _describe_sampling(comparison: PathComparison) -> str:
         f"twice as many samples change the largest error by {comparison.change / MM * 1e3:.2f} um,"
         f" and the largest orientation error by {comparison.change_turn / DEG:.5f} deg"
     )
-
-
-def _rounded(value: float) -> float | None:
-    return round(value, 7) if math.isfinite(value) else None
