@@ -206,13 +206,29 @@ class PagedStorage:
             found = min(fitting, key=lambda file: file.length)
             self.waiting.remove(found)
             return found
-        while sum(file.length for file in self.waiting) > WAITING:
+        self._keep_waiting(WAITING)
+        file = self._new_file(length)
+        if file is None and self.waiting:  # the disk may be full of them
+            self._keep_waiting(0)
+            file = self._new_file(length)
+        return file
+
+    def _keep_waiting(self, most: int) -> None:
+        """Ends the oldest of the files that wait, until they have ``most`` bytes at most."""
+        while sum(file.length for file in self.waiting) > most:
             self.waiting.pop(0).stream.close()
+
+    def _new_file(self, length: int) -> PageFile | None:
+        """A file of ``length`` bytes; None where the disk has no room."""
         try:
             stream = tempfile.TemporaryFile(dir=self.folder, buffering=0)  # noqa: SIM115  as long as it is mapped
+        except OSError:
+            return None
+        try:
             # a page for which the disk has no room later would end the process
             os.posix_fallocate(stream.fileno(), 0, length)
         except OSError:
+            stream.close()
             return None
         return PageFile(stream, length)
 
