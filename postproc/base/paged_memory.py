@@ -207,11 +207,11 @@ class PagedStorage:
             self.waiting.remove(found)
             return found
         self._keep_waiting(WAITING)
-        file = self._new_file(length)
-        if file is None and self.waiting:  # the disk may be full of them
+        new = self._new_file(length)
+        if new is None and self.waiting:  # the disk may be full of them
             self._keep_waiting(0)
-            file = self._new_file(length)
-        return file
+            new = self._new_file(length)
+        return new
 
     def _keep_waiting(self, most: int) -> None:
         """Ends the oldest of the files that wait, until they have ``most`` bytes at most."""
