@@ -25,6 +25,7 @@ from typing import IO, Any, TypeVar
 
 from postproc.base.array_memory import handler_for, is_allocating, set_handler
 from postproc.base.findings import Code, Finding, Refusal, define
+from postproc.base.memory import without_garbage_collection
 
 T = TypeVar("T")
 
@@ -289,7 +290,8 @@ class PagedStorage:
 
     def close(self) -> None:
         """Keep nothing that is not asked for any more; the C library takes back all of an array that is still there."""
-        with self._lists:
+        # no array may end between the look at its head and the writing to it
+        with self._lists, without_garbage_collection():
             for file in self.files:
                 if self._is_gone(file):
                     _unmap(file)
