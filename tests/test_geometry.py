@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays as array_of
 from scipy.spatial.transform import Rotation
 
+from postproc.base import geometry
 from postproc.base.geometry import (
+    PoseRows,
     Poses,
     abc_from_rotation,
     lengths,
@@ -284,3 +286,56 @@ def test_poses_of_one_for_all_are_taken_as_such():
     some = poses[np.array([2, 7])]
     assert some.position.tolist() == [[1.0, 2.0, 3.0]] * 2
     assert some.rotation.shape == (2, 3, 3)
+
+
+def remembered_rows(monkeypatch, count=1000):
+    """Poses by rows that are remembered by runs, the same without that, and the rows that were computed."""
+    monkeypatch.setattr(geometry, "STORED", 10)
+    rng = np.random.default_rng(5)
+    base = Poses.from_abc([0.1, -0.4, 0.2], [0.3, -0.2, 1.1])
+    poses = Poses.from_abc(rng.uniform(-2, 2, (count, 3)), rng.uniform(-3, 3, (count, 3)))
+    built = []
+
+    def build(rows):
+        built.append(rows)
+        return base @ poses[rows]
+
+    return PoseRows(count, build).remembered(), base @ poses, built
+
+
+def test_rows_of_a_block_and_their_neighbours_are_computed_once(monkeypatch):
+    rows, whole, built = remembered_rows(monkeypatch)
+    block = np.arange(200, 300)
+    for asked in (block, block - 1, block + 1, block[::3], np.repeat(block, 4), block[::-1], block[:0]):
+        there = rows[asked]
+        assert np.array_equal(there.rotation, whole.rotation[asked])
+        assert np.array_equal(there.position, whole.position[asked])
+    assert sum(map(len, built)) <= len(block) + 2
+    with pytest.raises(ValueError, match="read-only"):
+        rows[block].position[0] = 0.0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_remembered_rows_are_those_that_are_computed(monkeypatch, seed):
+    """To the last bit, whatever was asked for before: runs, some that overlap, single rows, rows here and there."""
+    rows, whole, _ = remembered_rows(monkeypatch)
+    rng = np.random.default_rng(seed)
+    at = 0
+    for _ in range(60):
+        size = int(rng.choice([2, 3, 50, 400]))
+        at = int(np.clip(at + rng.integers(-40, 60), 0, 999))
+        run = np.arange(at, min(at + size, 1000))
+        asked = run if rng.random() < 0.6 or len(run) < 2 else rng.choice(run, max(2, len(run) // 3))
+        if len(asked) < 2:
+            continue
+        there = rows[asked]
+        assert np.array_equal(there.rotation, whole.rotation[asked])
+        assert np.array_equal(there.position, whole.position[asked])
+        there = rows[rng.integers(0, 1000, 5)]  # not remembered
+
+
+def test_rows_here_and_there_are_not_computed_with_all_between(monkeypatch):
+    rows, whole, built = remembered_rows(monkeypatch)
+    asked = np.arange(0, 1000, 50)
+    assert np.array_equal(rows[asked].position, whole.position[asked])
+    assert sum(map(len, built)) == len(asked)

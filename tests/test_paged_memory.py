@@ -343,6 +343,30 @@ def test_a_disk_without_room_leaves_the_array_in_memory(small, monkeypatch):
     assert array.sum() == 99_999 * 50_000
 
 
+@alone
+def test_files_that_wait_make_room_on_a_full_disk(small, monkeypatch):
+    real, sizes = os.posix_fallocate, []
+
+    def full(number: int, start: int, length: int) -> None:
+        waiting = sum(file.length for file in storage.waiting)
+        sizes.append(waiting)
+        if waiting:
+            raise OSError(28, "No space left on device")
+        real(number, start, length)
+
+    with paged_memory.large_arrays_in_files(Path(__file__)):
+        storage = paged_memory.current_storage.get()
+        for _ in range(3):
+            np.arange(100_000)
+        assert len(storage.files) == 1, "a file serves one array after another"
+        monkeypatch.setattr(os, "posix_fallocate", full)
+        array = np.arange(10_000_000)
+        assert "deleted" in pages_at(array.ctypes.data)
+        assert sizes == [sizes[0], 0]
+        assert sizes[0] > 0
+    assert array[-1] == 9_999_999
+
+
 def test_no_room_anywhere_is_refused_before_anything_is_computed(tmp_path, monkeypatch):
     monkeypatch.setattr(paged_memory, "PROGRAM", 0)
     monkeypatch.setattr(paged_memory, "ROOM", 1 << 60)

@@ -138,13 +138,15 @@ class PoseRows:
         last = threading.local()
 
         def build(rows: Ints) -> Poses:
-            low, high = (int(rows.min()), int(rows.max()) + 1) if len(rows) else (0, 0)
+            if not len(rows):
+                return self.build(rows)
+            low, high = int(rows.min()), int(rows.max()) + 1
             run = getattr(last, "run", _Run(0, 0, UNKNOWN))
             if low < run.start or high > run.stop:
                 if low < 0 or high - low > min(REMEMBERED, 2 * len(rows)):
                     return self.build(rows)  # they are here and there
                 run = last.run = self._run(max(low - 1, 0), min(high + 1, self.count), run)
-            return run[rows, low, high] if len(rows) else self.build(rows)
+            return run[rows, low, high]
 
         return PoseRows(self.count, build)
 

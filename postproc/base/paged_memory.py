@@ -25,6 +25,7 @@ from typing import IO, Any, TypeVar
 
 from postproc.base.array_memory import handler_for, is_allocating, set_handler
 from postproc.base.findings import Code, Finding, Refusal, define
+from postproc.base.memory import without_garbage_collection
 
 T = TypeVar("T")
 
@@ -206,13 +207,29 @@ class PagedStorage:
             found = min(fitting, key=lambda file: file.length)
             self.waiting.remove(found)
             return found
-        while sum(file.length for file in self.waiting) > WAITING:
+        self._keep_waiting(WAITING)
+        new = self._new_file(length)
+        if new is None and self.waiting:  # the disk may be full of them
+            self._keep_waiting(0)
+            new = self._new_file(length)
+        return new
+
+    def _keep_waiting(self, most: int) -> None:
+        """Ends the oldest of the files that wait, until they have ``most`` bytes at most."""
+        while sum(file.length for file in self.waiting) > most:
             self.waiting.pop(0).stream.close()
+
+    def _new_file(self, length: int) -> PageFile | None:
+        """A file of ``length`` bytes; None where the disk has no room."""
         try:
             stream = tempfile.TemporaryFile(dir=self.folder, buffering=0)  # noqa: SIM115  as long as it is mapped
+        except OSError:
+            return None
+        try:
             # a page for which the disk has no room later would end the process
             os.posix_fallocate(stream.fileno(), 0, length)
         except OSError:
+            stream.close()
             return None
         return PageFile(stream, length)
 
@@ -273,7 +290,8 @@ class PagedStorage:
 
     def close(self) -> None:
         """Keep nothing that is not asked for any more; the C library takes back all of an array that is still there."""
-        with self._lists:
+        # no array may end between the look at its head and the writing to it
+        with self._lists, without_garbage_collection():
             for file in self.files:
                 if self._is_gone(file):
                     _unmap(file)

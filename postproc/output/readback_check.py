@@ -43,13 +43,17 @@ def intended_motions(
         | (inserted & (path.orientation_control.path[source] != 0))
     )
     arc, unchanged = np.isfinite(division.sweep[rows]), ~moved & ~division.transitions[rows]
-    centre = (to_base @ Poses(np.eye(3), division.centre[rows])).position
-    normal = (to_base.rotation @ division.normal[rows][..., None])[..., 0]
+    at, stays = np.flatnonzero(arc), np.flatnonzero(unchanged & ~arc)
+    two = at.repeat(2) if len(at) == 1 else at  # one row alone is rounded otherwise
+    numbers = two + rows.start if isinstance(rows, slice) else rows[two]
+    own = task.base.shared(source[two]).inverse()
+    centre = (own @ Poses(np.eye(3), division.centre[numbers])).position
+    normal = (own.rotation @ division.normal[numbers][..., None])[..., 0]
 
-    def select_arc(new: Floats, old: Floats) -> Floats:
-        more = (1,) * (new.ndim - 1)
-        stays = np.where(unchanged.reshape(-1, *more), old[source], np.nan)
-        return np.where(arc.reshape(-1, *more), new, stays)
+    def select_arc(new: Floats, old: Floats | FewRows) -> Floats:
+        values = np.full((len(source), *new.shape[1:]), np.nan)
+        values[stays], values[at] = old[source[stays]], new[: len(at)]
+        return values
 
     return Plan(
         source,
@@ -58,7 +62,7 @@ def intended_motions(
         np.where(turned[:, None, None], command.rotation, path.programmed_rotation[source]),
         select_arc(centre, path.arcs.centre),
         select_arc(normal, path.arcs.normal),
-        select_arc(division.sweep[rows], path.arcs.sweep),
+        select_arc(division.sweep[numbers], path.arcs.sweep),
         approximated_motions(task, division, rows),
         division.share[rows],
     )

@@ -415,11 +415,11 @@ class _WrenchTurning:
 
     def _base(self, pairs: Floats, rows: Ints, side: int) -> Floats:
         if is_shared(self.base_in_robot):
-            return np.asarray(pairs @ self.base_in_robot[0].T)
+            return _turned_alike(pairs, self.base_in_robot[0])
         return np.asarray(np.einsum("nij,nkj->nki", self.base_in_robot[rows], pairs))
 
     def _world(self, pairs: Floats, rows: Ints, side: int) -> Floats:
-        return pairs @ self.world_in_robot.T
+        return _turned_alike(pairs, self.world_in_robot)
 
     def _tool(self, pairs: Floats, rows: Ints, side: int) -> Floats:
         at = rows - (1 - side)
@@ -432,3 +432,8 @@ class _WrenchTurning:
             raise ValueError("forces in the feed frame need feed frames")
         turned = np.einsum("nki,nij->nkj", pairs, self.feed.end(rows, side))
         return np.where(self.path_length.known[rows - (1 - side)][:, None, None], turned, np.nan)
+
+
+def _turned_alike(pairs: Floats, rotation: Floats) -> Floats:
+    """Forces and moments (K, 2, 3) [N, N m] turned by one ``rotation`` (3, 3), as one product of matrices."""
+    return np.asarray((pairs.reshape(-1, 3) @ rotation.T).reshape(pairs.shape))
