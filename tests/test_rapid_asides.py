@@ -76,6 +76,17 @@ def test_a_handler_that_moves_the_robot_leaves_it_elsewhere(within: str) -> None
     assert backward.continues[1]
 
 
+def test_a_call_that_is_tried_again_starts_where_it_was_left() -> None:
+    sub = f"PROC sub()\nn:=n+1;\nMoveL p,v50,z10,t;\n{AT}\nWaitDI di1,1\\MaxTime:=1;\nENDPROC\n"
+    text = "PROC main()\nMoveL p,v50,fine,t;\nn:=1;\nsub;\n{}ENDPROC\n"
+    once = read(text.format("") + sub).toolpath
+    assert once.continues[1]
+    assert not once.constraints.refused
+    again = read(text.format("ERROR\nRETRY;\n") + sub).toolpath
+    assert again.predecessors[1] == (-2, 0)
+    assert again.constraints.refused[2].code == "RAP002"
+
+
 def test_runs_of_lines_start_anywhere_where_a_trap_moves_the_robot() -> None:
     lines = "".join(f"MoveL [[{x},0,0],[0,0,1,0],{EXTRA}],v50,z1,t;\n" for x in range(20))
     trap = "TRAP tr\nMoveL p,v50,fine,t;\nENDTRAP\n"

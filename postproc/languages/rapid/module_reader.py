@@ -22,7 +22,9 @@ SYNTAX = EditSyntax(comment=b"!", numbers_after=b"[,")
 
 
 @without_garbage_collection()
-@np.errstate(over="ignore", invalid="ignore")  # numbers that no robot has are refused, of whatever size they are
+@np.errstate(
+    over="ignore", invalid="ignore"
+)  # numbers that no robot has are refused, of whatever size they are
 def read(documents: tuple[Document, ...], settings: ReadingSettings, fast: bool = True) -> Program:
     """The program of a file; never raises on its content.
 
