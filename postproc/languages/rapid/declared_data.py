@@ -150,9 +150,9 @@ def _zero(kind: bytes, evaluator: Evaluator, depth: int) -> Value:
 class Usage:
     """Names in the routines: ``assigned`` anywhere, ``later``: not shown by the flow, ``read``: otherwise than
     as the point of a motion; ``calls``, ``assigned_in``, ``mentioned_in``: routine -> what it may call, assigns, and
-    has in it; ``written``: left of := anywhere; ``moves``: routines in which the robot may move; ``set_by_name``: data is set that a string names;
-    ``aside``: routines that traps, error handlers and synchronous calls of motions (MoveLSync) run; ``strays``: one of
-    these may move the robot, and does not keep the path (StorePath)."""
+    has in it; ``written``: left of := anywhere; ``moves``: routines in which the robot may move; ``set_by_name``: data
+    is set that a string names; ``aside``: routines that traps, error handlers and synchronous calls of motions
+    (MoveLSync) run; ``strays``: one of these may move the robot, and does not keep the path (StorePath)."""
 
     def __init__(self, module: Module) -> None:
         self.assigned: set[bytes] = set()
