@@ -76,6 +76,17 @@ def test_a_handler_that_moves_the_robot_leaves_it_elsewhere(within: str) -> None
     assert backward.continues[1]
 
 
+def test_a_call_that_is_tried_again_starts_where_it_was_left() -> None:
+    sub = f"PROC sub()\nn:=n+1;\nMoveL p,v50,z10,t;\n{AT}\nWaitDI di1,1\\MaxTime:=1;\nENDPROC\n"
+    text = "PROC main()\nMoveL p,v50,fine,t;\nn:=1;\nsub;\n{}ENDPROC\n"
+    once = read(text.format("") + sub).toolpath
+    assert once.continues[1]
+    assert not once.constraints.refused
+    again = read(text.format("ERROR\nRETRY;\n") + sub).toolpath
+    assert again.predecessors[1] == (-2, 0)
+    assert again.constraints.refused[2].code == "RAP002"
+
+
 def test_runs_of_lines_start_anywhere_where_a_trap_moves_the_robot() -> None:
     lines = "".join(f"MoveL [[{x},0,0],[0,0,1,0],{EXTRA}],v50,z1,t;\n" for x in range(20))
     trap = "TRAP tr\nMoveL p,v50,fine,t;\nENDTRAP\n"
@@ -187,3 +198,44 @@ HUGE = "[1E200,-1E308,1]"
 def test_numbers_that_no_robot_has_are_refused_without_a_warning_of_numpy(motion: str) -> None:
     path = read(f"VAR robtarget q;\nPROC main()\nMoveL p,v50,fine,t;\n{motion}\nENDPROC\n").toolpath
     assert 1 in path.constraints.refused
+
+
+def test_a_symbol_of_the_cell_is_that_of_the_argument() -> None:
+    """A routine may give it a name that means another frame in the cell."""
+    settings = ReadingSettings(symbols={"TSPINDLE": 1.0, "TOTHER": 2.0, "TOOL": 3.0})
+
+    def tools(main: str, parameter: str) -> list[int | str | None]:
+        text = (
+            f"MODULE m\nPROC main()\n{main}\nENDPROC\nPROC cut(PERS tooldata {parameter})\n"
+            f"MoveL [[1,2,3],[0,0,1,0],{EXTRA}],v50,z1,{parameter};\nENDPROC\nENDMODULE\n"
+        )
+        path = DIALECTS["rapid"].read((Document(Path("part.mod"), text.encode()),), settings).toolpath
+        refused = path.constraints.refused
+        return [
+            refused[row].code if row in refused else path.frames[path.tool[row]].number
+            for row in range(len(path))
+        ]
+
+    for parameter in ("tool", "tSpindle", "tl"):
+        assert tools("cut tSpindle;", parameter) == [1]
+        assert tools("cut tOther;", parameter) == [2]
+        assert tools("cut tool0;", parameter) == [0]
+        assert tools("cut tSpindle;\ncut tOther;", parameter) == ["RAP005"]
+
+
+@pytest.mark.parametrize(
+    "assigned",
+    [
+        "tSpindle.tframe.trans.z:=5;",
+        "tSpindle:=[TRUE,[[0,0,1],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];",
+        "change tSpindle;",
+    ],
+)
+def test_a_tool_that_the_cell_states_and_the_program_assigns(assigned: str) -> None:
+    text = (
+        f"MODULE m\nPROC main()\n{assigned}\nMoveL [[1,2,3],[0,0,1,0],{EXTRA}],v50,z1,tSpindle;\nENDPROC\n"
+        "PROC change(PERS tooldata tl)\ntl.tframe.trans.z:=5;\nENDPROC\nENDMODULE\n"
+    )
+    settings = ReadingSettings(symbols={"TSPINDLE": 1.0})
+    path = DIALECTS["rapid"].read((Document(Path("part.mod"), text.encode()),), settings).toolpath
+    assert path.constraints.refused[0].code == "RAP005"

@@ -107,9 +107,8 @@ class DeclaredData:
         if declaration is None:
             if name in PREDEFINED:
                 return PREDEFINED[name]
-            return UnknownData(
-                f"{_shown(name)} is not declared in this file" if name else "it is computed"
-            ), b""
+            reason = f"{_shown(name)} is not declared in this file" if name else "it is computed"
+            return UnknownData(reason, name), b""
         if name not in self._values:
             self._values[name] = UnknownData(f"{_shown(name)} depends on itself")
             self._values[name] = first_value(declaration, self.evaluator)
@@ -151,9 +150,9 @@ def _zero(kind: bytes, evaluator: Evaluator, depth: int) -> Value:
 class Usage:
     """Names in the routines: ``assigned`` anywhere, ``later``: not shown by the flow, ``read``: otherwise than
     as the point of a motion; ``calls``, ``assigned_in``, ``mentioned_in``: routine -> what it may call, assigns, and
-    has in it; ``moves``: routines in which the robot may move; ``set_by_name``: data is set that a string names;
-    ``aside``: routines that traps, error handlers and synchronous calls of motions (MoveLSync) run; ``strays``: one of
-    these may move the robot, and does not keep the path (StorePath)."""
+    has in it; ``written``: left of := anywhere; ``moves``: routines in which the robot may move; ``set_by_name``: data
+    is set that a string names; ``aside``: routines that traps, error handlers and synchronous calls of motions
+    (MoveLSync) run; ``strays``: one of these may move the robot, and does not keep the path (StorePath)."""
 
     def __init__(self, module: Module) -> None:
         self.assigned: set[bytes] = set()
@@ -164,6 +163,7 @@ class Usage:
         self.mentioned_in: dict[bytes, set[bytes]] = {}
         self.set_by_name = False
         self.moves: set[bytes] = set()
+        self.written: set[bytes] = set()
         self._called: set[bytes] = set()
         self._set: set[bytes] = set()
         self._mentioned: set[bytes] = set()
@@ -228,6 +228,7 @@ class Usage:
                         self._expressions(*target.indices)
                     target = target.base
                 if isinstance(target, Name):
+                    self.written.add(target.name)
                     self._set.add(target.name)
                     self._mentioned.add(target.name)
                 self._expressions(statement.value)

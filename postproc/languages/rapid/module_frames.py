@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from difflib import get_close_matches
 
 import numpy as np
@@ -20,16 +20,19 @@ _KEYS = ("X", "Y", "Z", "A", "B", "C")
 
 class ModuleFrames:
     """The frames that motions use, each once.  ``symbols``: what the cell states of names that the file does not
-    declare: the number of a tool or base of the cell, or a pose."""
+    declare: the number of a tool or base of the cell, or a pose; ``written``: names that the program assigns."""
 
-    def __init__(self, symbols: Mapping[str, Symbol], lines: Mapping[bytes, int]) -> None:
+    def __init__(
+        self, symbols: Mapping[str, Symbol], lines: Mapping[bytes, int], written: Set[bytes] = frozenset()
+    ) -> None:
         self.refs: list[FrameRef] = []
+        self._written = written
         self._symbols, self._lines = symbols, lines
         self._known: dict[tuple[object, ...], int] = {}
 
     def tool(self, use: FrameUse, line: int) -> int | Problem:
         """Index of a tool, or why it is not known."""
-        if use.name == b"TOOL0":
+        if self._name(use) == b"TOOL0":
             return self._index(("tool", 0), FrameRef(0, None, line))
         bound = self._bound("tool", use, line)
         if bound is not None:
@@ -44,7 +47,7 @@ class ModuleFrames:
 
     def base(self, use: FrameUse, line: int) -> int | Problem:
         """Index of a work object: user frame x object frame; or why it is not known."""
-        if use.name == b"WOBJ0":
+        if self._name(use) == b"WOBJ0":
             return self._index(("base", 0), FrameRef(0, None, line))
         bound = self._bound("base", use, line)
         if bound is not None:
@@ -62,26 +65,37 @@ class ModuleFrames:
 
     def _bound(self, kind: str, use: FrameUse, line: int) -> int | Problem | None:
         """The frame that the cell states for a name that the file does not declare."""
-        symbol = self._symbols.get(use.name.decode("latin-1")) if use.name else None
-        if symbol is None or use.name in self._lines or not isinstance(use.value, UnknownData):
+        name = self._name(use)
+        symbol = self._symbols.get(name.decode("latin-1")) if name and name not in self._lines else None
+        if symbol is None:
             return None
+        if name in self._written:
+            return "RAP005", f"the program itself assigns {_shown(name)}, which it does not declare"
         if not isinstance(symbol, Mapping):
             if symbol != int(symbol) or symbol < 0:
                 return (
                     "RAP005",
-                    f"the cell states {symbol:g} for {_shown(use)}, which is no number of a frame",
+                    f"the cell states {symbol:g} for {_shown(name)}, which is no number of a frame",
                 )
             return self._index((kind, int(symbol)), FrameRef(int(symbol), None, line))
         if set(symbol) != set(_KEYS):
-            return "RAP005", f"the cell does not state X, Y, Z, A, B, C of {_shown(use)}"
+            return "RAP005", f"the cell does not state X, Y, Z, A, B, C of {_shown(name)}"
         values = np.array([symbol[key] for key in _KEYS])
         return self._posed(kind, Poses.from_abc(values[:3] * MM, values[3:] * DEG), 0)
+
+    def _name(self, use: FrameUse) -> bytes:
+        """The name under which the cell may know a frame, whatever the routine of the motion calls it; that in the
+        motion where the file declares it."""
+        if isinstance(use.value, UnknownData):
+            return use.value.name
+        return use.name if use.name in self._lines else b""
 
     def _reason(self, use: FrameUse) -> str:
         """Why a frame is not known, with the name in the cell that may have been meant."""
         reason = reason_of(use.value, "its declaration is not understood")
-        if use.name and use.name not in self._lines:
-            close = get_close_matches(use.name.decode("latin-1"), self._symbols, 1)
+        name = self._name(use)
+        if name and name not in self._lines:
+            close = get_close_matches(name.decode("latin-1"), self._symbols, 1)
             return reason + "".join(f"; the cell has the symbol {name}" for name in close)
         return reason
 
@@ -107,5 +121,5 @@ def _pose(value: Value) -> Poses | None:
     return Poses(rotation, np.array(position) * MM)
 
 
-def _shown(use: FrameUse) -> str:
-    return use.name.decode("latin-1")[:40]
+def _shown(name: bytes) -> str:
+    return name.decode("latin-1")[:40]

@@ -121,7 +121,7 @@ def module_rows(
     document: Document, flow: Propagation, symbols: Mapping[str, Symbol]
 ) -> tuple[ModuleRows, ModuleFrames]:
     """The rows of a module, with the frames that they use."""
-    frames = ModuleFrames(symbols, _declared_lines(document, flow))
+    frames = ModuleFrames(symbols, _declared_lines(document, flow), flow.usage.written)
     never = list(_never_run(flow))
     rows = _rows(document, list(flow.facts.values()), [fact for fact, _ in never], flow.usage.strays)
     bounds = rows.first.tolist()[len(flow.facts) :]

@@ -126,7 +126,11 @@ def motion_fact(
     points = [_value(argument, evaluator) for argument in arguments.points]
     zone, stops = _zone(arguments, evaluator)
     work_object = options.get(b"WOBJ")
-    base = FrameUse(b"WOBJ0", UnknownData("")) if work_object is None else _frame(work_object, evaluator)
+    base = (
+        FrameUse(b"WOBJ0", UnknownData("", b"WOBJ0"))
+        if work_object is None
+        else _frame(work_object, evaluator)
+    )
     return MotionFact(
         statement,
         form,

@@ -371,6 +371,10 @@ class Propagation:
             self._unread_call(step, state, moves=True)
             self._lose_effects(routine.name, state)
             return
+        resumes = leaving_words(self._names.active[-1].handlers)
+        if b"RETRY" in resumes:  # it may have run already, and was left where an error occurred
+            self._lose_effects(routine.name, state)
+            self._change(step.arguments, state)
         evaluator = self._evaluator(state)
         required = [argument for argument in step.arguments if not argument.name]
         named = {argument.name: argument for argument in step.arguments if argument.name}
@@ -392,12 +396,13 @@ class Propagation:
         self._names.find_aliases(routine, pairs, self._effects.of(routine.name))
         after = self._routine(routine, inner, self._runner.recording)
         if after is None:
+            self._lose_effects(routine.name, state)
             self._leave_place(state)
             return
         displaced = state.displaced
         state.take(after)
         self._change(tuple(argument for name, argument in shared if name in changed), state)
-        if routine.handlers or b"TRYNEXT" in leaving_words(self._names.active[-1].handlers):
+        if routine.handlers or b"TRYNEXT" in resumes:
             self._lose_effects(routine.name, state)
             state.displaced |= displaced
 

@@ -62,6 +62,8 @@ class RoutineNames:
         before = routine.name + b"/"
         other: dict[bytes, bytes] = {}
         for parameter, names in shared:
+            if parameter in reach.assigned:
+                self._usage.written |= names
             for name in names:
                 key = self.key(name)
                 changed = not reach.assigned.isdisjoint((name, parameter))

@@ -20,9 +20,10 @@ class GroupValue(NamedTuple):
 
 
 class UnknownData(NamedTuple):
-    """``reason`` completes "... because"."""
+    """``reason`` completes "... because"; ``name``: that of data which the file does not declare."""
 
     reason: str
+    name: bytes = b""
 
 
 Value = Leaf | GroupValue | UnknownData
@@ -50,7 +51,9 @@ def joined(one: Value, other: Value, reason: str) -> Value:
         return Leaf(one.value) if same else UnknownData(reason)
     if isinstance(one, GroupValue) and isinstance(other, GroupValue) and len(one.items) == len(other.items):
         return GroupValue(tuple(joined(a, b, reason) for a, b in zip(one.items, other.items, strict=True)))
-    return one if isinstance(one, UnknownData) else UnknownData(reason)
+    if isinstance(one, UnknownData):
+        return UnknownData(one.reason) if one.name else one
+    return UnknownData(reason)
 
 
 def unknown_in(value: Value) -> UnknownData | None:
