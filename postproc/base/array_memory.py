@@ -38,7 +38,7 @@ class ArrayPlace(Protocol):
         """Put other pages in the place of ``size`` bytes at ``address``, which hold nothing yet or ``zeros``; memory
         stays as it is where there is no room for them.  False where it is lost and must not be used."""
 
-    def held(self, address: int) -> int:
+    def bytes_at(self, address: int) -> int:
         """Bytes at ``address`` where those of an array lie there, else 0: the C library knows nothing of them."""
 
 
@@ -81,7 +81,7 @@ def handler_for(place: ArrayPlace, usable: Callable[[int], int]) -> Any:
     realloc = ctypes.PYFUNCTYPE(*_REALLOC)(usual.realloc)
     free = ctypes.PYFUNCTYPE(*_FREE)(usual.free)
     # bound here: at the end of the process the names of modules may be gone before the last array
-    take_over, held, least, move = place.take_over, place.held, place.least, ctypes.memmove
+    take_over, bytes_at, least, move = place.take_over, place.bytes_at, place.least, ctypes.memmove
 
     def allocate(_: int | None, size: int) -> int | None:
         address: int | None = malloc(None, size)
@@ -96,7 +96,7 @@ def handler_for(place: ArrayPlace, usable: Callable[[int], int]) -> Any:
         return address
 
     def change_size(_: int | None, address: int, size: int) -> int | None:
-        old = held(address) if address else 0
+        old = bytes_at(address) if address else 0
         if not address or (size < least and not old):
             same: int | None = realloc(None, address, size)
             return same

@@ -190,7 +190,7 @@ class PagedStorage:
             ctypes.memset(start, 0, length)
         return True
 
-    def held(self, address: int) -> int:
+    def bytes_at(self, address: int) -> int:
         """See ``ArrayPlace``."""
         start = address - _HEAD + _PAGE
         return next((_PAGE - _HEAD + file.mapped for file in self.files if file.address == start), 0)

@@ -46,7 +46,7 @@ class Curves:
     first, step (G,) [m]: of the parameters; ends (G, 2) [m]: parameters of the points before and after; turn (G, T)
     [m]: at which the curve turns, ascending; place (G, N + 2, 3) [m]; tangent (G, N + 2, 3): unit vectors, square to
     which the distance is measured (where the tool is early or late nothing is off).  arc (G, 2): the motions before and
-    after the vertex, at 0, are; bent (G, N + 2, 3) [m]: the places as they are where no vertex is rounded off.
+    after the vertex, at 0, are; unrounded (G, N + 2, 3) [m]: the places as they are where no vertex is rounded off.
     """
 
     first: Floats
@@ -56,7 +56,7 @@ class Curves:
     place: Floats
     tangent: Floats
     arc: Bools
-    bent: Floats
+    unrounded: Floats
 
     def __getitem__(self, chosen: Ints | Bools) -> Curves:
         return Curves(*(getattr(self, each.name)[chosen] for each in fields(self)))
@@ -71,16 +71,16 @@ class Curves:
             )
         return parameter
 
-    def away(self, start: Floats, first: Floats, distance: Floats, way: int) -> Floats:
-        """(G,) [m] parameters of the places from ``first`` (G,) [m] on, ahead (``way`` 1) or back (-1), that are
+    def away(self, start: Floats, first: Floats, distance: Floats, direction: int) -> Floats:
+        """(G,) [m] parameters of the places from ``first`` (G,) [m] on, ahead (``direction`` 1) or back (-1), that are
         ``distance`` (G,) [m] or more from those with the parameters ``start`` (G,) [m]; ``first`` where none is."""
         count = self.place.shape[1] - 2
         parameter = self.first[:, None] + self.step[:, None] * np.arange(count)
         gap = _sizes(self.place[:, 1:-1] - self.at(start[:, None])[0])
-        good = (gap >= distance[:, None]) & (way * (parameter - first[:, None]) >= 0.0)
-        nearest = np.min(np.where(good, way * parameter, np.inf), axis=1)
+        good = (gap >= distance[:, None]) & (direction * (parameter - first[:, None]) >= 0.0)
+        nearest = np.min(np.where(good, direction * parameter, np.inf), axis=1)
         here = _sizes((self.at(first[:, None])[0] - self.at(start[:, None])[0])[:, 0])
-        return np.where(np.isfinite(nearest) & (here < distance), way * nearest, first)
+        return np.where(np.isfinite(nearest) & (here < distance), direction * nearest, first)
 
     def at(self, parameter: Floats) -> tuple[Floats, Floats, Floats]:
         """Places, tangents and derivatives (G, S, 3) of the places at parameters (G, S)."""
@@ -102,7 +102,7 @@ class Curves:
     def _bent(self, parameter: Floats) -> Floats:
         low, part, _ = self._number(parameter)
         one = np.arange(len(low))[:, None]
-        return np.asarray(self.bent[one, low] * (1.0 - part) + self.bent[one, low + 1] * part)
+        return np.asarray(self.unrounded[one, low] * (1.0 - part) + self.unrounded[one, low + 1] * part)
 
     def _number(self, parameter: Floats) -> tuple[Ints, Floats, Floats]:
         """(G, S) numbers of the places before parameters (G, S), (G, S, 1) the parts of the way to the next, and
@@ -310,7 +310,7 @@ def _weights(
         slopes.append(slope if more is None else slope + more)
         bends.append(bend)
 
-    def bent(i: int, share: Floats) -> Floats:
+    def unrounded(i: int, share: Floats) -> Floats:
         if not curves.arc.any():
             return np.zeros((*share.shape, 3))
         return curves.bends(label[:, i], label[:, i + 1], share, 0 if i < vertex else 1)
@@ -323,7 +323,7 @@ def _weights(
             share = low[:, None] + away if i else (high[:, None] - away)[:, ::-1]
         part = np.zeros((groups, share.shape[1], count))
         part[:, :, i], part[:, :, i + 1] = 1.0 - share, share
-        add(part, None, bent(i, share))
+        add(part, None, unrounded(i, share))
 
     u = ON_PARABOLA
     line(0)
@@ -338,8 +338,8 @@ def _weights(
             of_share = of_share / length[:, i - 1 + k][:, None, None]
             toward = curve[None, :, None] * (step[:, i] if k else -step[:, i - 1])[:, None, :]
             more += toward[:, :, :, None, None] * of_share[:, None, None]
-        before = (1.0 - u)[:, None] * bent(i - 1, 1.0 - shares[0][:, None] * (1.0 - u))
-        add(part, more, before + u[:, None] * bent(i, shares[1][:, None] * u))
+        before = (1.0 - u)[:, None] * unrounded(i - 1, 1.0 - shares[0][:, None] * (1.0 - u))
+        add(part, more, before + u[:, None] * unrounded(i, shares[1][:, None] * u))
         line(i)
     slope = np.concatenate(slopes, axis=1)[:, :, :, 1:-1]
     return (
