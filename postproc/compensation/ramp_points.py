@@ -253,10 +253,10 @@ def _curves(task: CompensationProblem, division: Subdivision, ramps: _FittedRamp
     share = along / task.desired_path.length[row]
     share = np.where(along < 0.0, 1.0 + share, share)
     place = commands_on_rounded_path(task, row, share).position
-    bent = commands_on_path(task, row, share).position if ramps.arc.any() else place
+    unrounded = commands_on_path(task, row, share).position if ramps.arc.any() else place
     tangent = original(task, row, share)[1]
     shape = (len(ramps.row), PLACES, 3)
-    place, bent, tangent = place.reshape(shape), bent.reshape(shape), tangent.reshape(shape)
+    place, unrounded, tangent = place.reshape(shape), unrounded.reshape(shape), tangent.reshape(shape)
     turn = np.stack([np.zeros(len(first)), ramps.end], axis=1)
     # the points before the vertex, or it, and after those of the ramp
     before = np.where(ramps.exact, ramps.vertex, ramps.vertex - 1)
@@ -269,9 +269,11 @@ def _curves(task: CompensationProblem, division: Subdivision, ramps: _FittedRamp
         on_path = task.desired_path.length[row] * (share if side else share - 1.0)
         beyond = np.maximum(on_path, stop + NEAREST) if side else np.minimum(on_path, first - NEAREST)
         ends[:, side] = np.where(ramps.arc[:, side] & rounded[:, side], beyond, ends[:, side])
-    place, bent = (np.concatenate([far[0][:, None], a, far[1][:, None]], axis=1) for a in (place, bent))
+    place, unrounded = (
+        np.concatenate([far[0][:, None], a, far[1][:, None]], axis=1) for a in (place, unrounded)
+    )
     tangent = np.concatenate([tangent[:, :1], tangent, tangent[:, -1:]], axis=1)
-    return Curves(first, step, ends, turn, place, tangent, ramps.arc, bent)
+    return Curves(first, step, ends, turn, place, tangent, ramps.arc, unrounded)
 
 
 _V, _E = "vertex", "end"
