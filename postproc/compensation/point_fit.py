@@ -95,11 +95,11 @@ class Curves:
         (``side`` 0) or after it, are off the lines between their ends, at the shares (G, S); 0 of lines."""
         ends = np.stack([low, high], axis=1)
         parameter = low[:, None] + share * (high - low)[:, None]
-        found, last = self._bent(parameter), self._bent(ends)
+        found, last = self._at_unrounded(parameter), self._at_unrounded(ends)
         found -= last[:, :1] + share[..., None] * (last[:, 1:] - last[:, :1])
         return np.where(self.arc[:, side, None, None], found, 0.0)
 
-    def _bent(self, parameter: Floats) -> Floats:
+    def _at_unrounded(self, parameter: Floats) -> Floats:
         low, part, _ = self._number(parameter)
         one = np.arange(len(low))[:, None]
         return np.asarray(self.unrounded[one, low] * (1.0 - part) + self.unrounded[one, low + 1] * part)
