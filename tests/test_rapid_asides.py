@@ -142,6 +142,13 @@ def test_nothing_is_inserted_before_a_comment_that_several_others_may_precede() 
     held = path.toolpath.constraints.no_insert_before
     assert "paths" in held[2] or "comment" in held[2]
     assert 3 not in held
+    # of a loop that is unrolled the comment follows another one in the first pass than in the second
+    unrolled = read(
+        "PROC main()\n! FORCE 9 0 0\nMoveL p,v50,fine,t;\nFOR i FROM 1 TO 2 DO\nMoveL Offs(p,0,9,0),v50,fine,t;\n"
+        "MoveL p,v50,fine,t; ! FORCE 1 0 0\nMoveL Offs(p,1,0,0),v50,fine,t; ! FORCE 2 0 0\nENDFOR\nENDPROC\n"
+    ).toolpath.constraints.no_insert_before
+    assert "comment" in unrolled[2]
+    assert 3 not in unrolled
     straight = read(
         f"PROC main()\nMoveL p,v50,fine,t;\n{lines}ENDPROC\n"
     ).toolpath.constraints.no_insert_before

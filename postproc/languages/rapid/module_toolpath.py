@@ -16,9 +16,11 @@ from postproc.languages.core.row_facts import OTHER_PATHS, follow_on, grouped, m
 from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.module_frames import ModuleFrames
 from postproc.languages.rapid.module_rows import ModuleRows, module_rows
+from postproc.languages.rapid.program_state import VARYING, Varying
 from postproc.languages.rapid.propagation import Propagation
 from postproc.languages.rapid.quaternions import rotation_from_quaternion
 from postproc.languages.rapid.remarks import put_remarks
+from postproc.languages.rapid.syntax_tree import Remark
 from postproc.languages.rapid.target_places import RapidSourceMap
 from postproc.toolpath import (
     Arcs,
@@ -72,7 +74,7 @@ def module_toolpath(
         constraints=EditConstraints(
             refused=refused,
             locked=_locked(document, rows, flow, refused),
-            no_insert_before=_no_insert_before(rows, flow.mixed, continues, refused),
+            no_insert_before=_no_insert_before(rows, flow.preceding, continues, refused),
         ),
         orientation_control=OrientationControl(
             mode=rows.per_row([fact.orientation for fact in facts], np.int8)
@@ -200,9 +202,12 @@ def _pose(frame: FrameRef) -> Poses | None:
 
 
 def _no_insert_before(
-    rows: ModuleRows, mixed: set[int], continues: Bools, refused: Mapping[int, Finding]
+    rows: ModuleRows,
+    preceding: Mapping[int, Remark | Varying | None],
+    continues: Bools,
+    refused: Mapping[int, Finding],
 ) -> dict[int, str]:
-    """Rows before which nothing can be inserted.  mixed: offsets of comments before which others may be in force."""
+    """Rows before which nothing can be inserted.  preceding: offset of a comment -> the one in force before it."""
     same = rows.quadrants >= 0
     same[1:] &= rows.quadrants[1:] == rows.quadrants[:-1]
     same[:1] = False
@@ -218,7 +223,9 @@ def _no_insert_before(
             why = "it starts or carries a process whose distances count from its own start"
         elif b"T" in fact.arguments.options:
             why = "its time is stated (\\T)"
-        elif any(one.start > fact.statement.start and one.start in mixed for one in fact.remarks()):
+        elif any(
+            one.start > fact.statement.start and preceding.get(one.start) is VARYING for one in fact.remarks()
+        ):
             why = "before the comment in its line several others may be in force"
         wordless = "" if text.target is not None and text.target.words else NO_WORDS
         for row in range(start, stop) if why or wordless else [start]:

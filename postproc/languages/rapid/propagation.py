@@ -31,7 +31,7 @@ from postproc.languages.rapid.instructions import (
     is_motion,
 )
 from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read, override_of, waits_at
-from postproc.languages.rapid.program_state import ELSEWHERE, START, VARYING, ProgramState
+from postproc.languages.rapid.program_state import ELSEWHERE, START, VARYING, ProgramState, Varying
 from postproc.languages.rapid.routine_entries import program_entries, run_again, run_aside, value_at_start
 from postproc.languages.rapid.routine_names import RoutineNames
 from postproc.languages.rapid.routine_runner import RoutineRunner
@@ -74,7 +74,7 @@ class Propagation:
     """Runs a module.  ``facts``: offset of a motion -> its fact, in the order in which they run first; ``passed``:
     comments in that order with the number of motions before each; ``calls``: name of what is not in the file -> offset
     of its first call; ``reads``: where the place of the robot is read -> the motions after which; ``unread``:
-    statements that are not understood; ``mixed``: comments before which several others may be in force."""
+    statements that are not understood; ``preceding``: the comment in force before each, VARYING where several may."""
 
     def __init__(self, module: Module, raw: bytes) -> None:
         self.module = module
@@ -104,7 +104,7 @@ class Propagation:
         self._restarts = any(b"EXITCYCLE" in leaving_words(body) for body in bodies)
         self._numbers = KeyNumbers()
         self._meetings: defaultdict[int, Meeting] = defaultdict(Meeting)
-        self.mixed: set[int] = set()
+        self.preceding: dict[int, Remark | Varying | None] = {}
         self.rows = 0
         self.waited: set[Source] = set()
         self._steps = MOST_STEPS + 4 * sum(_length(one) for r in module.routines for one in walk(r.body))
@@ -258,8 +258,8 @@ class Propagation:
             self.passed.setdefault(step.start, (step, self.rows))
         word = step.text.split(" ")[0].split("\t")[0].split(",")[0].upper()
         if place := {"FORCE": "force", "COMPENSATE": "switch"}.get(word):
-            if getattr(state, place) is VARYING:
-                self.mixed.add(step.start)
+            if self.preceding.setdefault(step.start, before := getattr(state, place)) != before:
+                self.preceding[step.start] = VARYING
             setattr(state, place, step)
 
     def _instruction(self, step: Instruction, state: ProgramState) -> None:
