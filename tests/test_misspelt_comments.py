@@ -110,3 +110,13 @@ def test_in_every_language(compensate, tmp_path, name):
     assert done.code == 1
     assert f":{raw[: raw.index(b'FORCE 120')].count(10) + 1} FRC002 'FORSE 120 260 -60" in done.err
     assert not (folder / "compensated").exists()
+
+
+@pytest.mark.parametrize(("option", "reported"), [("--force=0,360,560", True), ("--force", False)])
+def test_a_value_of_the_option_that_takes_the_place_of_comments_is_reported(compensate, tmp_path, option, reported):
+    folder = tmp_path / "sample"
+    shutil.copytree((SAMPLES / "kr270_pocket"), folder)
+    program = folder / "pocket.ngc"
+    first = program.read_bytes().split(b"FORCE", 1)[0].count(b"\n") + 1
+    done = compensate(program, option, "--dry-run")
+    assert (f"pocket.ngc:{first} FRC035 " in done.out + done.err) == reported

@@ -312,6 +312,14 @@ FORCE_CODES = define(
             action="State forces in N and moments in N m.",
             example="`--force 0,0.36,0.56`.",
         ),
+        "FRC035": Code(
+            "info",
+            "FORCE comments are not used",
+            meaning="The program has FORCE comments, and --force has a value.",
+            consequence="The value (a force, a CSV, a process file) alone states the forces, also after FORCE OFF.",
+            action="Use --force without a value for the forces of the comments.",
+            example="`compensate panel.src --force 0,360,560`, with `;FORCE 0 280 0` in panel.src.",
+        ),
         "FRC033": Code(
             "error",
             "spindle turns counter-clockwise",

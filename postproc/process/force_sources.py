@@ -28,6 +28,9 @@ PROCESS = (".yaml", ".yml")
 _STATED = re.compile(r"force\s+[-+.@\d]", re.IGNORECASE)
 """A FORCE comment that is no FORCE OFF."""
 
+_COMMENT = re.compile(r"force\s+(?:[-+.@\d]|off\b)", re.IGNORECASE)
+"""Any FORCE comment."""
+
 SourcedForces = tuple[StatedForces, tuple[Finding, ...], str]
 """Forces, what there is to say of them, and the name of their source."""
 
@@ -55,9 +58,21 @@ def wrenches(
         return Wrenches.zero(len(toolpath))
     if spec.strip():
         stated, findings, source = request.explicit(spec.strip(), Path(), "", 0, f"--force {spec.strip()}")
+        findings = (*findings, *_overridden_comments(request))
     else:
         stated, findings, source = _belonging(request, cell)
     return turn_to_robot_axes(stated, toolpath, frames, cell, str(program), source, findings)
+
+
+def _overridden_comments(request: _ForceRequest) -> list[Finding]:
+    """FRC035 where the program has FORCE comments, and the value of --force is used instead."""
+    lines = [note.line for note in request.toolpath.annotations if _COMMENT.match(note.text.strip())]
+    if not lines:
+        return []
+    comments = f"{len(lines)} FORCE comments are" if len(lines) > 1 else "the FORCE comment is"
+    message = f"{comments} not used, FORCE OFF neither: --force has a value"
+    help = "use --force without a value for the forces of the comments"
+    return [Finding("FRC035", message, str(request.program), lines[0], help=help)]
 
 
 def not_requested(program: Path, toolpath: Toolpath, cell: Cell) -> Finding:
