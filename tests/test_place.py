@@ -6,6 +6,7 @@ import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from postproc.placement.refine_places import refine_place
 from postproc.placement.room import FREEDOMS, Room, inside_polygon
 from postproc.placement.score_places import score_places
 from postproc.placement.search_places import distinct, start_places
+from postproc.report.placement import Placement
 from postproc.workflows.place import place
 from postproc.workflows.place_problem import PlaceRequest, place_problem
 from postproc.workflows.preparation import Request, prepare
@@ -37,13 +39,28 @@ def request(folder: Path, **change) -> PlaceRequest:
     return PlaceRequest(**{"programs": (folder / "part.src",), "force": "", "ranges": ranges, **change})
 
 
+class Placed(NamedTuple):
+    """A sample with all freedoms, and the folder of the cell with its best place."""
+
+    name: str
+    placement: Placement
+    folder: Path
+
+
+def placed_sample(name: str, folder: Path) -> Placed:
+    asked = PlaceRequest((program_of(name),), "", ranges_around(name), output=folder / "placed.yaml")
+    return Placed(name, place(asked), folder)
+
+
 @pytest.fixture(scope="module")
 def placed(tmp_path_factory):
-    """The milling sample, with all freedoms, and where its files are."""
-    folder = tmp_path_factory.mktemp("placed")
-    program = program_of("milling")
-    asked = PlaceRequest((program,), "", ranges_around("milling"), output=folder / "placed.yaml")
-    return place(asked), folder
+    """The placement of the milling sample, and where its files are."""
+    return placed_sample("milling", tmp_path_factory.mktemp("placed"))[1:]
+
+
+@pytest.fixture(scope="module", params=["milling", "panel", "pocket"])
+def sample(request, tmp_path_factory):
+    return placed_sample(request.param, tmp_path_factory.mktemp("sample"))
 
 
 # the search
@@ -131,10 +148,10 @@ def test_the_objective_is_what_is_small(job, objective):
 
 
 @pytest.mark.slow
-def test_the_written_cell_gives_what_is_promised(placed, compensate):
-    done, folder = placed
+def test_the_written_cell_gives_what_is_promised(sample, compensate):
+    name, done, folder = sample
     out = compensate(
-        program_of("milling"), "--force", "--cell", folder / "placed.yaml", "--dry-run", "--json", "-"
+        program_of(name), "--force", "--cell", folder / "placed.yaml", "--dry-run", "--json", "-"
     ).json
     assert out["error_before_mm"]["max"] == pytest.approx(done.best.error.max * 1e3, abs=1e-6)
     assert out["across_feed_mm"]["before"]["max"] == pytest.approx(done.best.across.max * 1e3, abs=1e-6)
@@ -143,16 +160,20 @@ def test_the_written_cell_gives_what_is_promised(placed, compensate):
 
 def wanted_by_text(program: Path, cell: Path):
     """Targets of the LIN motions (rotation, position [m]) in the robot base, from program text and cell file alone."""
-    frame = yaml.safe_load(cell.read_text())["bases"][1]
+    stated = yaml.safe_load(cell.read_text())
+    frame = stated["bases"][1]
     base = turn_of(frame["a"], frame["b"], frame["c"])
     origin = np.array([frame[key] for key in "xyz"], float)
     words = dict.fromkeys("XYZABC", np.nan)
+    words |= {key.upper(): float(value) for key, value in stated.get("orientation", {}).items()}
     found = {}
     for number, line in enumerate(program.read_text(encoding="latin-1").splitlines(), 1):
-        if not line.startswith(("LIN {", "CIRC {")):
+        if not line.startswith(("LIN {", "CIRC {", "G1 ", "G2 ", "G3 ", "G0 ")):
             continue
         target = line.rpartition("{")[2]
-        words |= {key: float(value) for key, value in re.findall(r"([XYZABC]) ([-\d.]+)", target)}
+        words |= {key: float(value) for key, value in re.findall(r"([XYZABC]) ?([-\d.]+)", target)}
+        if line.startswith("G0 "):
+            continue
         if np.isfinite(list(words.values())).all():
             point = np.array([words[key] for key in "XYZ"])
             found[number] = base @ turn_of(*(words[key] for key in "ABC")), (origin + base @ point) / 1e3
@@ -164,26 +185,25 @@ def turn_of(a, b, c):
     return about(z, np.radians(a)) @ about(y, np.radians(b)) @ about(x, np.radians(c))
 
 
-def at_best(placed):
+def at_best(sample: Placed):
     """The program as it is prepared with the written cell, and the arm in MuJoCo."""
-    _, folder = placed
-    ready = prepare(Request(program_of("milling"), force="", cell=folder / "placed.yaml"))
+    ready = prepare(Request(program_of(sample.name), force="", cell=sample.folder / "placed.yaml"))
     return ready, Plant.of(ready.task.model, links=())
 
 
 @pytest.mark.slow
-def test_every_motion_is_feasible_by_an_independent_kinematics(placed):
+def test_every_motion_is_feasible_by_an_independent_kinematics(sample):
     """MuJoCo's forward kinematics of the axis angles brings the tool to the target that the text states."""
-    done, folder = placed
-    ready, plant = at_best(placed)
+    name, done, folder = sample
+    ready, plant = at_best(sample)
     task, cell = ready.task, yaml.safe_load((folder / "placed.yaml").read_text())
     spindle = cell["tools"][1]
     tool_turn = turn_of(spindle["a"], spindle["b"], spindle["c"])
     tool_place = np.array([spindle[key] for key in "xyz"]) / 1e3
-    targets = wanted_by_text(program_of("milling"), folder / "placed.yaml")
+    targets = wanted_by_text(program_of(name), folder / "placed.yaml")
     limits = np.array([[-185, 185], [-146, 0], [-119, 155], [-350, 350], [-125, 125], [-350, 350]])
     rows = [row for row in range(len(task.toolpath)) if int(task.toolpath.line[row]) in targets]
-    assert len(rows) >= 12
+    assert len(rows) >= {"milling": 12, "panel": 2725, "pocket": 156}[name]
     flange_in_link = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
     for row in rows:
         q = task.track.q[row]
@@ -202,10 +222,10 @@ def test_every_motion_is_feasible_by_an_independent_kinematics(placed):
 
 
 @pytest.mark.slow
-def test_mujoco_sees_the_same_reduction(placed):
-    done, _ = placed
-    ready, _ = at_best(placed)
-    now = prepare(Request(program_of("milling"), force=""))
+def test_mujoco_sees_the_same_reduction(sample):
+    name, done, _ = sample
+    ready, _ = at_best(sample)
+    now = prepare(Request(program_of(name), force=""))
     seen = []
     for one in (now, ready):
         task, plant = one.task, Plant.of(one.task.model, links=())
