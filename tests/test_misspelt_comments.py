@@ -113,7 +113,9 @@ def test_in_every_language(compensate, tmp_path, name):
 
 
 @pytest.mark.parametrize(("option", "reported"), [("--force=0,360,560", True), ("--force", False)])
-def test_a_value_of_the_option_that_takes_the_place_of_comments_is_reported(compensate, tmp_path, option, reported):
+def test_a_value_of_the_option_that_takes_the_place_of_comments_is_reported(
+    compensate, tmp_path, option, reported
+):
     folder = tmp_path / "sample"
     shutil.copytree((SAMPLES / "kr270_pocket"), folder)
     program = folder / "pocket.ngc"

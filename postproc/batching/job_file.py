@@ -117,7 +117,9 @@ def refuse_unusable(options: OptionValues) -> None:
         try:
             parse_force(force)
         except NotAForce as error:
-            raise Refusal(Finding("FRC002", f"--force {force}: {error}", help=f"write {FORM}")) from None
+            raise Refusal(
+                Finding("FRC002", f"--force {force} is not a force: {error}", help=f"write {FORM}")
+            ) from None
     for file in files:
         if file is not None and not os.path.isfile(str(file)):
             raise Refusal(Finding("FIL001", "the file does not exist", str(file)))

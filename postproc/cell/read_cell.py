@@ -65,8 +65,9 @@ AXES = {
     for k, name in enumerate("xyz")
     for sign in "+-"
 }
-_MEANT = re.compile(r"[\w.-]*cell[\w-]*\.(?:ya?ml(?:\.txt)?|json)\Z", re.IGNORECASE)
+_RESEMBLING = (".yaml", ".yml", ".yaml.txt", ".yml.txt", ".json")
 _NUMBER = re.compile(r"[1-9][0-9]{0,5}\Z")
+_WORD = re.compile(r"[\w-]+")
 
 
 def _resembling(folder: Path) -> str:
@@ -75,7 +76,14 @@ def _resembling(folder: Path) -> str:
         names = sorted(os.listdir(folder))
     except OSError:
         return ""
-    return next((name for name in names if _MEANT.match(name)), "")
+    return next((name for name in names if _resembles_cell(name.lower())), "")
+
+
+def _resembles_cell(name: str) -> bool:
+    """Whether a file of this name (small letters) could be meant as the cell: my_cell.yml, cell.yaml.txt."""
+    suffix = max((one for one in _RESEMBLING if name.endswith(one)), key=len, default="")
+    stem = name.removesuffix(suffix).rpartition(".")[2]
+    return bool(suffix) and "cell" in stem and _WORD.fullmatch(stem) is not None
 
 
 def find_cell(program: Path) -> Path:

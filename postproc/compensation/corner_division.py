@@ -189,7 +189,7 @@ def commands_on_rounded_path(task: CompensationProblem, row: Ints, share: Floats
 
 
 def commands_on_path(task: CompensationProblem, row: Ints, share: Floats) -> Poses:
-    """The same on the path that rounds off nothing."""
+    """The commands (K) at the shares (K,) of rows (K,) of the path that rounds off nothing."""
     wanted = task.desired_path.at(row, share)
     goal = task.goal(row, wanted, share)
     return task.command(row, wanted, task.force.along(row, share), goal, share=share).command

@@ -162,7 +162,7 @@ CODES = define(
             "warning",
             "range of turns reads as radians",
             meaning="Both ends of a range of turns are a round part of pi, which no angle in degrees is.",
-            consequence="The part or the tool is turned by a small part of what is meant.",
+            consequence="The part or the tool is turned by a small part of the intended angle.",
             action="Write the range in degrees.",
             example="--turn=-1.571:1.571 instead of --turn=-90:90.",
         ),

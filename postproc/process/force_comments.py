@@ -23,10 +23,10 @@ _REST = re.compile(r"force(?=[\s,@]|\Z)[\s,]*", re.IGNORECASE)
 
 _OFF = ((0.0,) * 6, BASE)
 
-_VALUE = r"[-+]?\d[\d.,]*"
-_LETTER = r"[FM]?[XYZ]\s*[:=]?\s*"
+_VALUE = r"[-+]?\d[\d.]*+"
+_LETTER = r"[FM]?[XYZ]\s*+(?:[:=]\s*+)?"
 _MEANT = re.compile(
-    rf"([A-Za-z]{{4,7}})[\s:=,_]*(?:(O\w{{1,3}}|0FF)\s*\Z|(?:{_LETTER})?{_VALUE}(?:[\s,;]+(?:{_LETTER})?{_VALUE}){{2}})",
+    rf"([A-Za-z]{{4,7}})[\s:=,_]*+(?:(O\w{{1,3}}|0FF)\s*+\Z|(?:{_LETTER})?{_VALUE}(?:[\s,;]++(?:{_LETTER})?{_VALUE}){{2}})",
     re.IGNORECASE,
 )
 """A word, and OFF or three numbers with or without letters: what a force comment states, misspelt or not."""

@@ -326,7 +326,10 @@ def _refuse_suffix(target: Path, ready: Prepared) -> None:
     """Raises Refusal FIL014 where the controller would not load a file of this name, and the program's own it may."""
     known, own = ready.dialect.suffixes, ready.program.documents[0].path.suffix
     if known and target.suffix.lower() not in (*known, own.lower()):
-        message = f"a {ready.dialect.family} program ends in {' or '.join(known)}, and the output in {target.suffix!r}"
+        family = ready.dialect.family
+        message = (
+            f"the suffix of the output is {target.suffix!r}, that of a {family} program {' or '.join(known)}"
+        )
         help = f"name it {target.with_suffix(own).name}"
         raise Refusal(Finding("FIL014", message, str(target), help=help))
 

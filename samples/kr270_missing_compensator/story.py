@@ -18,7 +18,7 @@ from plant import Plant, kr270  # noqa: E402
 
 from postproc.cli.main import run  # noqa: E402
 from postproc.model import StiffnessModel  # noqa: E402
-from postproc.verification.differences import ending  # noqa: E402
+from postproc.verification.differences import end_rows  # noqa: E402
 from postproc.verification.pairing import pair_motions  # noqa: E402
 from postproc.verification.simulator import Simulator  # noqa: E402
 from postproc.workflows.preparation import Request, prepare  # noqa: E402
@@ -41,7 +41,7 @@ def cut(program: Path, plant: Plant) -> np.ndarray:
     sent = prepare(Request(program, force="", cell=HERE / "cell.yaml")).task
     pairing = pair_motions(wanted, sent)  # motions may have been inserted
     simulator = Simulator.of(wanted, pairing)
-    ends = ending(simulator, simulator.run(sent, pairing.start, pairing.stop).samples)
+    ends = end_rows(simulator, simulator.run(sent, pairing.start, pairing.stop).samples)
     rows = np.flatnonzero(wanted.carries)[::EVERY]
     away = []
     for row in rows:

@@ -20,12 +20,12 @@ class TpWriter:
             if label not in self.labels:
                 self.lines.append(f"  LBL[{label}]")
                 self.labels.append(label)
-                self._motion()
+                self.motion()
         text = "".join(f"{n:4d}:{line} ;\n" for n, line in enumerate(self.lines, 1))
-        points = "".join(self._point(n) for n in range(1, 10))
+        points = "".join(self.point(n) for n in range(1, 10))
         return f"/PROG DRAWN\n/ATTR\nLINE_COUNT\t= {len(self.lines)};\n/MN\n{text}/POS\n{points}/END\n"
 
-    def _point(self, n: int) -> str:
+    def point(self, n: int) -> str:
         draw = self.random.uniform
         if n == 1:
             values = ",".join(f"J{k}= {draw(-90, 90):.3f} deg" for k in range(1, 7))
@@ -37,16 +37,16 @@ class TpWriter:
         )
         return f"P[{n}]{{\n   GP1:\n\tUF : {base}, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\t{place},\n\t{turn}\n}};\n"
 
-    def _pick(self, *some: str) -> str:
+    def pick(self, *some: str) -> str:
         return some[int(self.random.integers(len(some)))]
 
     def _number(self, low: int, high: int) -> int:
         return int(self.random.integers(low, high))
 
-    def _motion(self) -> None:
-        speed = self._pick("50mm/sec", "300cm/min", "R[1]mm/sec", "R[2]mm/sec", "40inch/min")
-        corner = self._pick("FINE", "CNT100", "CR10")
-        more = " Offset,PR[1]" if self.random.random() < 0.05 else self._pick("", " ACC80")
+    def motion(self) -> None:
+        speed = self.pick("50mm/sec", "300cm/min", "R[1]mm/sec", "R[2]mm/sec", "40inch/min")
+        corner = self.pick("FINE", "CNT100", "CR10")
+        more = " Offset,PR[1]" if self.random.random() < 0.05 else self.pick("", " ACC80")
         if self.random.random() < 0.2:
             self.lines.append(
                 f"C P[{self._number(2, 9)}]    \n    :  P[{self._number(2, 9)}] {speed} {corner}{more}"
@@ -59,9 +59,9 @@ class TpWriter:
     def _statement(self) -> None:
         draw = self.random.random()
         if draw < 0.45 or self.depth > 2:
-            self._motion()
+            self.motion()
         elif draw < 0.62:
-            self._setting()
+            self.setting()
         elif draw < 0.72:
             self._jump()
         elif draw < 0.82:
@@ -71,12 +71,12 @@ class TpWriter:
         elif draw < 0.94:
             self._select()
         else:
-            self.lines.append("  " + self._pick("CALL OTHER", "P[3]=PR[1]", "Weave Sine[1]", "Weave End"))
+            self.lines.append("  " + self.pick("CALL OTHER", "P[3]=PR[1]", "Weave Sine[1]", "Weave End"))
 
-    def _setting(self) -> None:
+    def setting(self) -> None:
         self.lines.append(
             "  "
-            + self._pick(
+            + self.pick(
                 f"R[1]={self._number(1, 90)}", "R[2]=R[1]+5", "R[1]=R[1]*2", "R[3]=1", "OVERRIDE=50%",
                 f"!FORCE {self._number(1, 9)} 2 3", "//FORCE 7 8 9", "!other words", "UFRAME_NUM=2", "UFRAME_NUM=1",
                 "UFRAME_NUM=R[3]",
@@ -84,9 +84,9 @@ class TpWriter:
         )  # fmt: skip
 
     def _condition(self) -> str:
-        return self._pick("DI[1]=ON", "R[3]=1", "R[1]>40", "R[3]<>1", "R[9]=2")
+        return self.pick("DI[1]=ON", "R[3]=1", "R[1]>40", "R[3]<>1", "R[9]=2")
 
-    def _label(self) -> int:
+    def label(self) -> int:
         if self.labels and self.random.random() < 0.5:
             return int(self.random.choice(self.labels))
         label = len(self.labels) + len(self.wanted) + 10
@@ -99,9 +99,9 @@ class TpWriter:
             self.labels.append(label)
             self.lines.append(f"  LBL[{label}]")
             return
-        action = self._pick("JMP", "JMP", "set", "END") if self.depth == 0 else "set"
+        action = self.pick("JMP", "JMP", "set", "END") if self.depth == 0 else "set"
         words = {
-            "JMP": f"JMP LBL[{self._label()}]" if action == "JMP" else "",
+            "JMP": f"JMP LBL[{self.label()}]" if action == "JMP" else "",
             "set": "R[1]=7",
             "END": "END",
         }[action]
@@ -130,8 +130,8 @@ class TpWriter:
     def _select(self) -> None:
         if self.depth:
             return
-        self.lines.append(f"  SELECT R[9]=1,JMP LBL[{self._label()}]")
-        self.lines.append(f"         =2,{self._pick('CALL OTHER', f'JMP LBL[{self._label()}]')}")
+        self.lines.append(f"  SELECT R[9]=1,JMP LBL[{self.label()}]")
+        self.lines.append(f"         =2,{self.pick('CALL OTHER', f'JMP LBL[{self.label()}]')}")
 
 
 class FurtherTpWriter(TpWriter):
@@ -141,33 +141,33 @@ class FurtherTpWriter(TpWriter):
         self.calls = self.random.random() < 0.3
         return super().program()
 
-    def _point(self, n: int) -> str:
-        text = super()._point(n).replace("P[", f"P[{n}:name" + "]{", 1).replace("]{" + f"{n}]", "]")
+    def point(self, n: int) -> str:
+        text = super().point(n).replace("P[", f"P[{n}:name" + "]{", 1).replace("]{" + f"{n}]", "]")
         if n == 8:
             text = text.replace("\n};", "\n   GP2:\n\tUF : 1, UT : 1,\n\tJ1= 5.000 deg\n};")
         return text
 
-    def _motion(self) -> None:
+    def motion(self) -> None:
         before = len(self.lines)
-        super()._motion()
+        super().motion()
         line = self.lines[before]
         if line.startswith(("L", "C")) and "Offset" not in line and self.random.random() < 0.5:
             options = [
                 " INC", " Tool_Offset,PR[2]", " TA .10sec,DO[1]=ON", " DB 5.0mm,DO[2]=OFF", " Wjnt", " COORD", " RTCP",
-                " PTH", f" Skip,LBL[{self._label()}]" if self.depth == 0 else " ACC50",
+                " PTH", f" Skip,LBL[{self.label()}]" if self.depth == 0 else " ACC50",
             ]  # fmt: skip
             if self.calls:
                 options += [" TB .20sec,CALL OTHER", " TA .20sec,CALL OTHER(1)", " DB 3.0mm,CALL OTHER"] * 2
-            self.lines[before] = line + self._pick(*options)
+            self.lines[before] = line + self.pick(*options)
         if self.random.random() < 0.3:
             self.lines[before] = self.lines[before].replace("P[3]", "P[3:corner]").replace("P[4]", "P[4:a b]")
 
-    def _setting(self) -> None:
+    def setting(self) -> None:
         if self.random.random() < 0.7:
-            super()._setting()
+            super().setting()
         else:
             self.lines.append(
-                "  " + self._pick("PAYLOAD[1]", "UFRAME_NUM[GP2]=2", "R[1:speed]=33", "LBL[77:end]")
+                "  " + self.pick("PAYLOAD[1]", "UFRAME_NUM[GP2]=2", "R[1:speed]=33", "LBL[77:end]")
                 if 77 not in self.labels and self.depth == 0
                 else "  R[2]=44"
             )

@@ -233,8 +233,8 @@ def _no_insert_before(
         if not why and fact.checked is not False:
             for row in (start + np.flatnonzero(~same[start:stop])).tolist():
                 no_insert_before[row] = OTHER_QUADRANTS
-        if not continues[start]:
-            no_insert_before[start] = OTHER_PATHS
+        for row in (start + np.flatnonzero(~continues[start:stop])).tolist():
+            no_insert_before[row] = OTHER_PATHS
     return {row: why for row, why in no_insert_before.items() if why and row not in refused}
 
 
