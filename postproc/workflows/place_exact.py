@@ -78,11 +78,7 @@ def _check(ready: Prepared, request: PlaceRequest) -> None:
     found = margins.lack(ready.robot, (request.limit_margin, request.singularity_margin))
     if found is not None:
         row, words = found
-        raise Refusal(
-            Finding(
-                "PLC002", f"this motion is not feasible: {words}", task.file, int(task.toolpath.line[row])
-            )
-        )
+        raise Refusal(Finding("PLC002", words, task.file, int(task.toolpath.line[row])))
     if len(margins.wrong):
         message = "the stated configuration (S, T) of this motion is not one that reaches it"
         raise Refusal(Finding("PLC002", message, task.file, int(task.toolpath.line[margins.wrong[0]])))
