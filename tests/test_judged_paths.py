@@ -243,7 +243,7 @@ def test_a_cut_that_ends_too_early_is_seen(tmp_path: Path) -> None:
 
 # The cases
 
-REPORTED = re.compile(r"pole BC \w+, lean 0|lead-in|CIRC #CONSTANT|steps of|spline, SPL")
+REPORTED = re.compile(r"pole BC \w+, lean 0|lead-in|CIRC #CONSTANT|steps of|spline, SPL|panel, forces x 5")
 """Cases that are not within the tolerance, which the command reports: corrections that change faster than motions of
 one interpolation cycle can follow, poles of B and C, tools that keep their orientation, and what a controller does
 between the points of a spline."""
