@@ -316,7 +316,7 @@ FORCE_CODES = define(
             "info",
             "FORCE comments are not used",
             meaning="The program has FORCE comments, and --force has a value.",
-            consequence="The value (a force, a CSV, a process file) alone states the forces, also after FORCE OFF.",
+            consequence="The value states the forces: a force also of motions after FORCE OFF.",
             action="Use --force without a value for the forces of the comments.",
             example="`compensate panel.src --force 0,360,560`, with `;FORCE 0 280 0` in panel.src.",
         ),

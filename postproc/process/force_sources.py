@@ -58,19 +58,23 @@ def wrenches(
         return Wrenches.zero(len(toolpath))
     if spec.strip():
         stated, findings, source = request.explicit(spec.strip(), Path(), "", 0, f"--force {spec.strip()}")
-        findings = (*findings, *_overridden_comments(request))
+        findings = (*findings, *_overridden_comments(request, spec.strip()))
     else:
         stated, findings, source = _belonging(request, cell)
     return turn_to_robot_axes(stated, toolpath, frames, cell, str(program), source, findings)
 
 
-def _overridden_comments(request: _ForceRequest) -> list[Finding]:
-    """FRC035 where the program has FORCE comments, and the value of --force is used instead."""
-    lines = [note.line for note in request.toolpath.annotations if _COMMENT.match(note.text.strip())]
+def _overridden_comments(request: _ForceRequest, spec: str) -> list[Finding]:
+    """FRC035 where the program has FORCE comments, and the value of --force is used instead; a table and a process
+    still take motions after FORCE OFF for air."""
+    one_force = not spec.lower().endswith((LOG, *PROCESS))
+    form = _COMMENT if one_force else _STATED
+    lines = [note.line for note in request.toolpath.annotations if form.match(note.text.strip())]
     if not lines:
         return []
     comments = f"{len(lines)} FORCE comments are" if len(lines) > 1 else "the FORCE comment is"
-    message = f"{comments} not used, FORCE OFF neither: --force has a value"
+    also = ", FORCE OFF neither" if one_force else ""
+    message = f"{comments} not used{also}: --force has a value"
     help = "use --force without a value for the forces of the comments"
     return [Finding("FRC035", message, str(request.program), lines[0], help=help)]
 
