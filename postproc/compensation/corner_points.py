@@ -158,5 +158,5 @@ def shortest_arc(task: CompensationProblem, rows: Ints) -> Floats:
 
 
 def _with_sagitta(radius: Floats | float, tolerance: float) -> Floats:
-    """(...) [m] the shortest arcs that are told from their chords."""
+    """(...) [m] the shortest arcs that are distinguished from their chords."""
     return np.asarray(np.sqrt(8.0 * SAGITTA * tolerance * np.asarray(radius)))
