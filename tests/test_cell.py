@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from motions import toolpath_of
 
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import Poses
@@ -50,7 +51,7 @@ def refused(action) -> list[Finding]:
 def toolpath(base, tool, frames, position=None, kind=Kind.LIN) -> Toolpath:
     n = len(base)
     where = np.zeros((n, 3)) if position is None else np.asarray(position, float)
-    return Toolpath(
+    return toolpath_of(
         kind=np.full(n, kind),
         position=where,
         rotation=np.tile(np.eye(3), (n, 1, 1)),

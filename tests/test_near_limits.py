@@ -72,8 +72,7 @@ def told(robot, before, after, source=None, moved=None, status=None, feed=None, 
     model = StiffnessModel(robot, ())
     wanted, command = (robot.nominal_chain.flange(q) @ TOOL for q in (before, after))
     path = motions(wanted)
-    path = replace(
-        path,
+    path = path.with_columns(
         feed=path.feed if feed is None else np.broadcast_to(feed, n),
         line=path.line if lines is None else np.array(lines),
     )

@@ -292,7 +292,7 @@ def test_air_in_a_base_that_was_not_touched_stays():
     model = with_compensator(paper(), **SOFTER)
     task = job(model, 4)
     task = touched(task, task.wanted.position[:1])
-    other = replace(task.toolpath, base=np.array([0, 1, 0, 1]))
+    other = task.toolpath.with_columns(base=np.array([0, 1, 0, 1]))
     task = replace(task, toolpath=other)
     rows = np.arange(4)
     still = predict(

@@ -70,7 +70,17 @@ from postproc.languages.gcode.source_map import STATE, FoldedNumbers, GcodeSourc
 from postproc.languages.gcode.subprogram_files import JoinedText, file_name, join
 from postproc.languages.gcode.tool_orientation import ToolOrientations
 from postproc.languages.gcode.words import How, Note, key
-from postproc.toolpath import Arcs, EditConstraints, Kind, OrientationControl, Toolpath
+from postproc.toolpath import (
+    Arcs,
+    EditConstraints,
+    Kind,
+    MotionSequence,
+    MotionSpeeds,
+    OrientationControl,
+    ProgramComments,
+    Targets,
+    Toolpath,
+)
 
 PART = 1 << 14
 """Blocks whose motions are worked out at a time."""
@@ -132,16 +142,27 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     timed = state["feed_mode"] == Feed.INVERSE_TIME
     drilled = found.take_column("drills")
     path = Toolpath(
-        kind=built.kind,
-        position=found.take_column("place"),
-        rotation=found.take_column("rotation"),
-        axes=everywhere(np.full(6, np.nan), len(rows)),
-        feed=found.take_column("feed"),
-        spindle=shared(found.take_column("spindle")),
-        base=frame_of_base,
-        tool=frame_of_tool,
+        targets=Targets(
+            kind=built.kind,
+            position=found.take_column("place"),
+            rotation=found.take_column("rotation"),
+            axes=everywhere(np.full(6, np.nan), len(rows)),
+            base=frame_of_base,
+            tool=frame_of_tool,
+            frames=cell_frames,
+            external=external,
+        ),
         line=line,
-        frames=cell_frames,
+        speeds=MotionSpeeds(
+            feed=found.take_column("feed"),
+            spindle=shared(found.take_column("spindle")),
+            inverse_time_feed=timed if timed.any() else everywhere(False, len(rows)),
+        ),
+        sequence=MotionSequence(
+            approximation=with_stops(found.take_column("blend"), given, rows),
+            continues=~(drilled | np.append(False, drilled[:-1])[: len(rows)]),
+            drills=drilled,
+        ),
         constraints=EditConstraints(
             refused=refused,
             locked=locked_rows(document, given, built, collector, execution, run.levels),
@@ -154,18 +175,12 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
             exact_stays=True,
             ptp_may_change_configuration=False,
         ),
-        annotations=said.annotations,
         arcs=Arcs(*(found.take_column(name) for name in ("centre", "normal", "sweep", "plane_free"))),
-        approximation=with_stops(found.take_column("blend"), given, rows),
-        comments=said.comments,
-        inverse_time_feed=timed if timed.any() else everywhere(False, len(rows)),
         orientation_control=OrientationControl(
             path=found.take_column("orientation_path"),
             **{name: found.take_column(name) for name in ("rotary_from", "rotary_to", "redundant_axis")},
         ),
-        external=external,
-        drills=drilled,
-        continues=~(drilled | np.append(False, drilled[:-1])[: len(rows)]),
+        remarks=ProgramComments(said.annotations, said.comments),
     )
     findings = [
         *_read_too(document, joined, execution.missing),
