@@ -75,7 +75,7 @@ def test_what_is_left_is_what_the_robot_does_with_the_commands(said, gain):
     there = predict(
         job.model,
         result.command[rows],
-        LoadCase(TOOL, job.wrench[rows], NOTHING, job.track.status[rows], job.track.q[rows]),
+        LoadCase(TOOL, job.wrench[rows], NOTHING, job.track.branch[rows], job.track.q[rows]),
     ).pose
     wanted = job.wanted[rows]
     shift, turn = pose_error(there, wanted)

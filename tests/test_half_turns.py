@@ -155,7 +155,7 @@ def densely(robot, track, target, tool, count=2000):
     for share in np.linspace(0, 1, count + 1)[1:]:
         rotation = rotation_from_vector(share * turn) @ begin.rotation
         position = begin.position + share * (end.position - begin.position)
-        q = inverse(robot.nominal, Poses(rotation, position) @ tool.inverse(), track.status[[1]], q).q
+        q = inverse(robot.nominal, Poses(rotation, position) @ tool.inverse(), track.branch[[1]], q).q
     return q[0]
 
 

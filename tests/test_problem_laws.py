@@ -24,7 +24,7 @@ NONE, Z, ACROSS = np.full(3, np.nan), np.array([0.0, 0.0, 1.0]), np.array([0.6, 
 def predicted(job, rows, command, wrench):
     tool = Poses(np.tile(TOOL.rotation, (len(rows), 1, 1)), np.tile(TOOL.position, (len(rows), 1)))
     return predict(
-        job.model, command, LoadCase(tool, wrench, NOTHING, job.track.status[rows], job.track.q[rows])
+        job.model, command, LoadCase(tool, wrench, NOTHING, job.track.branch[rows], job.track.q[rows])
     )
 
 

@@ -52,7 +52,7 @@ def as_run(task, limits=None, gain=1.0):
         stops=old.stops[plan.source],
     )
     base, tool = task.base[plan.source], task.tool[plan.source]
-    track = replace(task.track, q=task.track.q[plan.source], status=task.track.status[plan.source])
+    track = replace(task.track, q=task.track.q[plan.source], branch=task.track.branch[plan.source])
     run = replace(task, toolpath=path, wanted=base @ path.target_in_base, base=base, tool=tool, track=track)
     return run, division
 

@@ -41,7 +41,7 @@ from postproc.compensation.mirror import ANGLE_TOLERANCE, POSITION_TOLERANCE, in
 from postproc.model import NOTHING, StiffnessModel
 from postproc.robot.chain import Chain
 from postproc.robot.description import find_robot, load_robot
-from postproc.robot.inverse import status_of
+from postproc.robot.inverse import branch_of
 from tests.benchmarks.loop import Loop
 from tests.benchmarks.machine import heading
 from tests.benchmarks.parts import made_apart
@@ -96,7 +96,7 @@ def timed(work: Callable[[], object], count: int) -> float:
 def mirror_loop(states: States) -> None:
     model, q, wrench = states.model, states.q, states.wrench
     wanted = model.chain.flange(q) @ TOOL
-    status = status_of(model.robot.nominal, q)
+    status = branch_of(model.robot.nominal, q)
     loop = Loop(model, TOOL)
     places = [pin.SE3(wanted.rotation[i], wanted.position[i]) for i in range(PLAIN)]
 
