@@ -65,8 +65,8 @@ def follow_axes(
     ``base``, ``tool`` (N): frames of the motions, in the robot base and on the flange, where there are any.
 
     Arms of closed form: a PTP takes the branch and the turns that it states; without them the branch stays and each
-    axis takes the shorter turn.  On path motions the branch stays and the axes follow the path (see ``HalfTurns``).  After a
-    PTP to an unknown target the branch is unknown until something states it.
+    axis takes the shorter turn.  On path motions the branch stays and the axes follow the path (see ``HalfTurns``).
+    After a PTP to an unknown target the branch is unknown until something states it.
 
     Other arms have no branches.  Each motion is solved from the one before it (see ``newton.follow_rows``), so branch
     and turns are those that lead on from ``start`` or from the last axis motion; only a PTP may take others, where

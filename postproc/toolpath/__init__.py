@@ -8,7 +8,7 @@ from postproc.toolpath.motion_speeds import MotionSpeeds
 from postproc.toolpath.orientation_control import OrientationControl, OrientationMode, OrientationPath
 from postproc.toolpath.partial_targets import PartialTargets
 from postproc.toolpath.planned_motions import Plan, Role
-from postproc.toolpath.remarks import Annotation, ProgramComments
+from postproc.toolpath.program_comments import Annotation, ProgramComments
 from postproc.toolpath.targets import COMPUTED, LOST, FrameRef, Kind, Targets
 from postproc.toolpath.toolpath import Toolpath, external_at
 

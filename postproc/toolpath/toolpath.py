@@ -25,7 +25,7 @@ from postproc.toolpath.motion_sequence import MotionSequence
 from postproc.toolpath.motion_speeds import MotionSpeeds
 from postproc.toolpath.orientation_control import OrientationControl, OrientationMode
 from postproc.toolpath.partial_targets import PartialTargets
-from postproc.toolpath.remarks import Annotation, ProgramComments
+from postproc.toolpath.program_comments import Annotation, ProgramComments
 from postproc.toolpath.targets import LOST, FrameRef, Kind, Targets
 
 STATED_BY_ALL = ("targets", "speeds", "sequence", "remarks")
