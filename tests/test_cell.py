@@ -91,7 +91,7 @@ def test_every_key_is_read_in_si(tmp_path):
     assert (cell.max_correction, cell.min_segment) == (pytest.approx(8e-3), pytest.approx(5e-4))
     assert cell.max_growth == 3
     assert (cell.controller.absolute_accuracy, cell.controller.gravity_compensated) == (True, False)
-    assert cell.integer_words == "um"
+    assert cell.dialect_options == {"integer_words": "um"}
 
 
 def test_defaults(tmp_path):
@@ -105,7 +105,7 @@ def test_defaults(tmp_path):
     assert cell.tolerance_angle == pytest.approx(np.radians(0.01))
     assert (cell.min_segment, cell.max_growth) == (pytest.approx(1e-3), 2.0)
     assert not cell.controller.absolute_accuracy
-    assert cell.integer_words == ""
+    assert cell.dialect_options == {}
     assert (cell.cycle_ms, cell.force_ramp, cell.temperature) == (12.0, None, None)
     assert (cell.force_ci95, cell.force_vector, cell.touch_points) == (None, None, {})
     assert cell.tools[1].diameter is None

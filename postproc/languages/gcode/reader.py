@@ -27,6 +27,7 @@ from postproc.languages.gcode.blocks import (
     frame_events,
     tilted,
 )
+from postproc.languages.gcode.cell_options import INTEGER_WORDS
 from postproc.languages.gcode.comments import remarks
 from postproc.languages.gcode.control import (
     Control,
@@ -91,7 +92,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     document = documents[0]
     joined = join(document.raw, settings.siblings, control)
     text = joined.source
-    integers = integer_words(text, control, settings.integer_words)
+    integers = integer_words(text, control, settings.options.get(INTEGER_WORDS, ""))
     execution = execute(text, control, settings.symbols, joined.blocks if joined.files else None)
     if joined.files and not execution.followed:
         return read(documents, control, replace(settings, siblings=()))
