@@ -79,9 +79,9 @@ class Cell:
     interval of all forces, as a share of them; None where nothing is stated.  ``dialect``: name of the programs'
     language, where their names and contents do not identify it; ``dialect_options``: key of a ``DialectOption`` -> what
     is stated for it, a file relative to the cell file.  ``force_vector``: intervals of the forces besides their scale;
-    ``force_factors``: operation -> what was learnt of its force; ``tool_errors``: number of a tool -> how it differs from what is programmed;
-    ``force_ramp`` [m]: the path over
-    which a force changes, None where it is not stated.  ``correct``: one of ``MODES``; ``touch_points``: number of a
+    ``force_factors``: operation -> what was learnt of its force; ``tool_errors``: number of a tool -> how it differs
+    from what is programmed; ``force_ramp`` [m]: the path over which a force changes, None where it is not stated.
+    ``correct``: one of ``MODES``; ``touch_points``: number of a
     base -> (K, 3) [m] places in it at which it was touched off, None for the one base that a program uses;
     ``touch_line`` is where they are.  ``temperature`` [degC] of the robot.
     ``symbols``: values of names that only the controller knows; ``program_start``: the state at the first statement;
