@@ -93,5 +93,5 @@ def by_files(trial: Trial, seed: int, campaign: int, folder: Path) -> StiffnessM
     data, robot, new = (folder / name for name in ("readings.csv", "robot.yaml", "identified.yaml"))
     data.write_bytes(measurements_csv(readings))
     robot.write_bytes(raw)
-    identify(IdentifyRequest((data,), str(robot), trial.words, new, folds=0, bootstrap=0))
+    identify(IdentifyRequest((data,), str(robot), new, effects=trial.words, folds=0, bootstrap=0))
     return StiffnessModel.from_robot(load_robot(new))
