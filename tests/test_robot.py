@@ -65,7 +65,7 @@ def test_jacobian_is_pinocchios(chain, robot):
     rng = np.random.default_rng(2)
     q, tool = random_angles(robot, 50, rng), random_tools(50, rng)
     ours = chain.jacobian(q, tool)
-    flange = chain.model.frames[chain.flange_id]
+    flange = chain.model.frames[chain.model.getFrameId("flange")]
     for row in range(len(q)):
         model = chain.model.copy()
         place = flange.placement * pin.SE3(tool.rotation[row], tool.position[row])

@@ -136,7 +136,9 @@ def linear_deflection(states: States, python: str, folder: Path) -> None:
     model = states.model.without_effects(["gravity_compensator"])
     chain = Chain(model.robot.joints, model.robot.flange)
     placed = [chain.model.jointPlacements[i + 1] for i in range(chain.model.nq)]
-    placed.append(chain.model.frames[chain.flange_id].placement * pin.SE3(TOOL.rotation, TOOL.position))
+    placed.append(
+        chain.model.frames[chain.model.getFrameId("flange")].placement * pin.SE3(TOOL.rotation, TOOL.position)
+    )
     compliance = list(model.terms[0].values.values())
     given, answer = folder / "states.npz", folder / "deflections.npy"
     np.savez(

@@ -338,8 +338,7 @@ class ProgramFlow(Calls):
         run = self.run
         if run.structure.inline and item.kind == StatementKind.COMMENT and INLINE.match(item.comment):
             state = run.state
-            at = run.document.raw.rfind(b"\n", 0, item.at) + 1
-            state.form = InlineFormState(at, (state.base, state.tool), state.feed)
+            state.form = InlineFormState((state.base, state.tool))
         text = item.comment[1:].decode("latin-1").strip()
         note = Annotation(len(run.rows), text, item.line)
         if _ANNOTATION.match(item.comment):

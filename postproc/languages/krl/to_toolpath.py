@@ -129,7 +129,6 @@ def _places(rows: MotionRows, table: MotionTable, spots: Spots) -> KrlSourceMap:
         locked=rows.locked,
         arcs=rows.arcs,
         relative=rows.relative,
-        inline=rows.inline,
     )
 
 
