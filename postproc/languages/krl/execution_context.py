@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from postproc.base.document import Document
@@ -248,7 +248,7 @@ class ExecutionContext:
         if one is None or other is None:
             return one or other
         sources = self.rows.joined(one.state.sources | other.state.sources)
-        state = replace(joined(one.state, other.state), sources=sources)
+        state = joined(one.state, other.state).changed(sources=sources)
         return Flow(state, self.variables.joined(one.variables, other.variables))
 
     def raised(self, head: Flow, back: Flow) -> Flow:

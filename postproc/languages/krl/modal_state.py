@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
-from operator import attrgetter
+from dataclasses import dataclass, field, fields
+from itertools import compress
+from operator import attrgetter, is_not
 from typing import Any
 
 import numpy as np
@@ -189,6 +190,12 @@ class ModalState:
         other.__dict__ = self.__dict__.copy()  # there are many, and __init__ takes several times as long
         return other
 
+    def changed(self, **values: object) -> ModalState:
+        """The same with other values."""
+        other = self.copy()
+        other.__dict__.update(values)
+        return other
+
     def lose_point(self, why: str) -> None:
         self.point = self.axes = self.point_frames = self.anchor = None
         self.point_unknown = why
@@ -222,15 +229,19 @@ class ModalState:
             self.frames_record = self.path_record = self.axis_record = None
 
 
-_NAMES = tuple(entry.name for entry in fields(ModalState))
+_OF_POINT = ("point", "point_frames", "anchor", "point_unknown")
+_POINT_OF = attrgetter(*_OF_POINT)
+_NAMES = tuple(entry.name for entry in fields(ModalState) if entry.name not in (*_OF_POINT, "sources"))
 _VALUES = attrgetter(*_NAMES)
 
 
 def joined(one: ModalState, other: ModalState) -> ModalState:
     """What holds where two paths meet, but for ``sources``; ``one`` itself where the other path adds nothing."""
     changed: dict[str, object] = {}
-    for name, a, b in zip(_NAMES, _VALUES(one), _VALUES(other), strict=True):
-        if a is b or name == "sources" or (name in _OF_POINT) or _same(a, b):
+    values, others = _VALUES(one), _VALUES(other)
+    for name in compress(_NAMES, map(is_not, values, others)):
+        a, b = getattr(one, name), getattr(other, name)
+        if _same(a, b):
             continue
         value = _JOINS[name](a, b)
         if not _same(value, a):
@@ -238,7 +249,7 @@ def joined(one: ModalState, other: ModalState) -> ModalState:
     point = _joined_points(one, other)
     if not all(map(_same, point, _POINT_OF(one))):
         changed |= zip(_OF_POINT, point, strict=True)
-    return replace(one, **changed) if changed else one  # type: ignore[arg-type]
+    return one.changed(**changed) if changed else one
 
 
 def _same(one: object, other: object) -> bool:
@@ -256,10 +267,6 @@ def _joined_frames(
     if isinstance(other, UnknownValue):
         return other
     return UnknownValue("KRL005", f"{name} varies: line {one.line} or line {other.line}")
-
-
-_OF_POINT = ("point", "point_frames", "anchor", "point_unknown")
-_POINT_OF = attrgetter(*_OF_POINT)
 
 
 def _varies(one: ModalState, other: ModalState) -> str:
