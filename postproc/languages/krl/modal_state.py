@@ -82,7 +82,7 @@ class FrameRegister:
     def values(self, frame: FrameIndex | UnknownValue) -> Numbers | None:
         return self._values[frame.index] if isinstance(frame, FrameIndex) else None
 
-    def taken(self, frame: FrameIndex, other: FrameRegister, line: int) -> FrameIndex:
+    def of_other(self, frame: FrameIndex, other: FrameRegister, line: int) -> FrameIndex:
         """The same frame as one of another register."""
         entry = other._refs[frame.index].in_entry
         if entry is not None:

@@ -311,4 +311,4 @@ def _moved(
 ) -> FrameIndex | UnknownValue:
     if isinstance(frame, UnknownValue):
         return frame
-    return target.taken(frame, source, line)
+    return target.of_other(frame, source, line)
