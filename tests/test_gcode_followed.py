@@ -197,3 +197,13 @@ def test_blocks_of_one_finding_are_in_the_order_of_the_file():
     program = read("linuxcnc", "O305 SUB\n@15.87\nO305 ENDSUB\nG1 F373.9\n@ 70.63\nM30\n", head="")
     found = next(one for one in program.findings if one.code == "GCO001")
     assert (found.line, found.message.partition("; ")[2]) == (2, "2 blocks, lines 2 to 5")
+
+
+def test_the_advice_for_a_reference_point_that_is_not_stated() -> None:
+    def advice(text: str) -> list[str]:
+        return [finding.help for finding in read("fanuc", text).findings if finding.code == "GCO013"]
+
+    assert advice("G28 B0.\nG1 X1. Y1. Z1.\n") == [
+        "state where G28 leads rotary axes in the cell: symbols: {G28: {B: 0}}"
+    ]
+    assert advice("G28 Z0.\nG1 X1. Y1. Z1. B5.\n") == [""]

@@ -123,7 +123,7 @@ CODES = define(
             ),
             action=(
                 "Let the post-processor write tip coordinates (G43.4), or all motions with the rotary "
-                "axes at 0; after G28 of a rotary axis, state its angle there (`symbols: {G28: {B: 0}}`)."
+                "axes at 0."
             ),
             example="`G1 X10 B30` without G43.4.",
         ),
