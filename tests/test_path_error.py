@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from postproc.base.geometry import Poses
 from postproc.compensation.correct import correct
-from postproc.compensation.path_error import SHARES, path_errors
+from postproc.compensation.path_error import SHARES, path_errors, programmed
 from postproc.compensation.subdivide import subdivide
 from postproc.compensation.subdivision import Limits, subdivided_motions
 from postproc.robot.inverse import inverse
@@ -51,6 +51,15 @@ def left_between(task, result):
         task, subdivided_motions(task, subdivide(task, result, Limits(no_insert=True)), rows)
     )
     return found
+
+
+def test_a_motion_as_programmed_is_the_whole_of_its_path(corrected):
+    task, result = corrected
+    rows = np.flatnonzero(result.corrected)
+    segments = programmed(task, rows)
+    assert (segments.first == 0.0).all()
+    assert (segments.last == 1.0).all()
+    np.testing.assert_array_equal(segments.end.position, task.wanted[rows].position)
 
 
 def test_between_is_where_the_controller_passes(corrected):
