@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from path_cases import corner, line
 
-from postproc.compensation.path_error import ON_RAMPS, SHARES, path_errors, path_errors_at, programmed
 from postproc.compensation.ramped_forces import STEEPEST, add_force_ramps, correction_steps
 from postproc.process import Wrenches
 from postproc.process.force_ramps import Ramps
@@ -147,18 +146,3 @@ def test_a_ramp_of_many_motions_reaches_their_end_points():
     np.testing.assert_allclose(ramped.at_end[:, 0], [0, 100, 100, 180, 260, 300])
     np.testing.assert_array_equal(ramped.steps, [False, True, False, False, False, False])
     assert force.ramped(np.empty(0, int), np.empty(0), np.ones(n), np.empty(0)) is force
-
-
-@pytest.mark.parametrize("length", [2e-3, 5e-3])
-def test_where_a_force_goes_over_the_path_is_looked_at_closely(length):
-    """The error of a motion with a ramp is the largest of those at all places."""
-    task = add_force_ramps(stepped(), length)
-    rows = np.array([3, 4])
-    segments = programmed(task, rows)
-    found, _ = path_errors(task, segments)
-    each = {share: path_errors_at(task, segments, np.full(2, share))[0] for share in (*SHARES, *ON_RAMPS)}
-    largest = np.max(list(each.values()), axis=0)
-    ramped = np.isin(rows, task.force.ramps.row)
-    np.testing.assert_array_equal(found[ramped], largest[ramped])
-    closely = np.max([each[share] for share in ON_RAMPS], axis=0)
-    assert (closely > np.max([each[share] for share in SHARES], axis=0))[ramped].any()
