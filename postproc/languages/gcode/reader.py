@@ -380,7 +380,7 @@ def _motions(
     kind[force[Group.AXIAL][rows] != 0] = Kind.PTP
     kind[words.modal.unknown[rows]] = Kind.OTHER
     pose = tool_orientations.of(trace, where, rows, words.start, kind == Kind.PTP)
-    moves = GcodeMotions.of(rows, move, kind, plane, start, end, where, desired_path, pose)
+    moves = GcodeMotions.of(rows, move, kind, plane, where, desired_path, pose)
     return with_holes(moves, holes, where)
 
 

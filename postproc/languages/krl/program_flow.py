@@ -199,15 +199,15 @@ class ProgramFlow(Calls):
         self.steps += 1
         if not self.reachable:
             return self._pass_over(pc, item)
-        if self.repeating or self.jumped:
+        if self.repeating or self.went_back:
             if self.seen[pc]:
                 count = len(item) if isinstance(item, VectorisedLines) else 1
-                if self.unsure or run.walked:
-                    self.spent_unsure += count
+                if self.not_followed or run.walked:
+                    self.spent_not_followed += count
                 else:
                     self.spent += count
             self.seen[pc] = 1
-            if self.spent > BUDGET or self.spent_unsure > BUDGET:
+            if self.spent > BUDGET or self.spent_not_followed > BUDGET:
                 elsewhere = self._give_up()
                 if elsewhere is not None:
                     return elsewhere
