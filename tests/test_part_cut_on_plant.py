@@ -1,5 +1,6 @@
 """The sample cut on MuJoCo by a machine that meets its own forces, as posted and as written, against the report."""
 
+import re
 import shutil
 
 import numpy as np
@@ -19,13 +20,29 @@ TOOLS = {1: (8.0, 3), 2: (5.0, 2)}  # radius mm, teeth
 LINES = {1: 12, 2: 60}
 
 
-@pytest.fixture(scope="module")
-def reported(tmp_path_factory, pytestconfig):
-    """The program, the task, and the part as the main job reports it."""
+def hard(text):
+    """The program as no CAM system posts it: roughed to the floor, and rows of the wave that turn in the stock."""
+    lines = text.splitlines()
+    floor, wall = lines.index("(FLOOR)"), next(k for k, line in enumerate(lines) if line.startswith("(WALL"))
+    lines = [line.replace("Z-7.500", "Z-8.000") for line in lines[:floor] + lines[wall:]]
+    wave = lines.index("(WAVE)")
+    inside = [
+        not (found := re.match(r"G1 X(-?[0-9.]+) Y", line)) or 10 <= float(found[1]) <= 110
+        for line in lines[wave:]
+    ]
+    rows = [line for line, stays in zip(lines[wave:], inside, strict=True) if stays]
+    return "\n".join([*lines[:wave], *(line.replace("G0 X-5.", "G0 X10.") for line in rows)]) + "\n"
+
+
+@pytest.fixture(scope="module", params=["sample", "hard"])
+def reported(request, tmp_path_factory, pytestconfig):
+    """Which program, its path, the task, and the part as the main job reports it."""
     folder = tmp_path_factory.mktemp("cut")
     shutil.copytree(pytestconfig.rootpath / "robots", folder / "robots")
     shutil.copytree(pytestconfig.rootpath / "samples/kr270_stock", folder / "samples/kr270_stock")
     program = folder / "samples/kr270_stock/part.ngc"
+    if request.param == "hard":
+        program.write_text(hard(program.read_text()))
     parts, find = [], postproc.part.part_error.find_part_error
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
