@@ -99,7 +99,7 @@ def test_a_ramp_cuts_with_its_bottom_too():
     # linear in the depth, so its mean is that of the middle; the chip of the sides is that of the way in the plane
     side, _, _ = expected("slot", 16 * MM, 5 * MM, chip=CHIP * np.cos(3 * DEG))
     thrust = 3 * FLAT.radius * (KNOWN.cutting[1] * CHIP * np.sin(3 * DEG) + KNOWN.edge[1])
-    force = side + [0, 0, thrust]
+    force = side + np.array([0, 0, thrust])
     assert np.linalg.norm(cut.mean[1, :3] - force) < 0.005 * np.linalg.norm(force)
 
 

@@ -54,6 +54,10 @@ def reported(request, tmp_path_factory, pytestconfig):
     return program, prepare(Request(program, force="")).task, parts[-1]
 
 
+def is_finished(program):
+    return "(FLOOR)" in program.read_text()
+
+
 def cut(task, path):
     line, plant = task.toolpath.line, Plant.of(task.model)
     arms = {}
@@ -81,7 +85,8 @@ def compare(machine, part, side):
 
 @pytest.mark.slow
 def test_the_part_as_posted_is_the_one_that_the_machine_cuts(reported):
-    """Engagement and deflection of 2.4 mm: the wall within 1 %, the floor and the wave 4 um but at rims.
+    """Engagement and deflection of 2.4 mm: the wall within 1 % (1.2 where it is roughed at two depths), the floor and
+    the wave 4 um but at rims.
 
     The machine cuts with the chip of the tool's own speed, the report with that of the feed: they differ where the tool
     enters and leaves, and its displacement changes along the feed."""
@@ -91,9 +96,12 @@ def test_the_part_as_posted_is_the_one_that_the_machine_cuts(reported):
     found = compare(machine, part, part.before)
     error, true = found["wall"]
     assert np.abs(true).max() > 2
-    assert np.percentile(np.abs(error - true), 90) < 0.01 * np.abs(true).max()
+    finished = is_finished(program)
+    assert np.percentile(np.abs(error - true), [75, 90]) == pytest.approx(
+        [0, 0], abs=(0.012 if finished else 0.01) * np.abs(true).max()
+    )
     error, true = found["floor"]
-    assert np.abs(true).max() > 0.09
+    assert np.abs(true).max() > (0.009 if finished else 0.09)
     assert np.percentile(np.abs(error - true), [75, 95]) == pytest.approx([0, 0], abs=5e-3)
     error, true = found["wave"]
     assert np.abs(true).max() > 0.3
@@ -102,8 +110,8 @@ def test_the_part_as_posted_is_the_one_that_the_machine_cuts(reported):
 
 @pytest.mark.slow
 def test_the_part_as_written_is_the_one_that_the_machine_cuts(reported):
-    """Within some um, but at the rims of the wave; where the path turns at once at the ends of its rows the tool turns
-    over some tenths of a millimetre, and leaves no more than is reported."""
+    """Within some um, but at the rims of the wave, and all of it within the tolerance.  Where a path turns at once in the
+    stock the tool turns over some tenths of a millimetre, and leaves no more than is reported."""
     program, task, part = reported
     machine = cut(task, program.parent / "compensated/part.ngc")
     assert machine.worst < 0.1
@@ -119,6 +127,12 @@ def test_the_part_as_written_is_the_one_that_the_machine_cuts(reported):
     error, true = found["floor"]
     assert np.percentile(np.abs(error - true), 99) < 0.02
     error, true = found["wave"]
+    if is_finished(program):
+        assert np.percentile(np.abs(error - true), 99) < 8e-3
+        for name, most in (("wall", 6e-3), ("floor", 1e-3), ("wave", 12e-3)):
+            assert np.abs(found[name]).max() < 1e3 * task.tolerance, name
+            assert np.abs(found[name][0] - found[name][1]).max() < most, name
+        return
     assert true.min() > -0.05
     assert 0.1 < true.max() < error.max() < 1.4 * true.max()
     assert np.percentile(np.abs(error - true), 99) < 0.025
