@@ -110,8 +110,8 @@ def test_the_part_as_posted_is_the_one_that_the_machine_cuts(reported):
 
 @pytest.mark.slow
 def test_the_part_as_written_is_the_one_that_the_machine_cuts(reported):
-    """Within some um, but at the rims of the wave, and all of it within the tolerance.  Where a path turns at once in the
-    stock the tool turns over some tenths of a millimetre, and leaves no more than is reported."""
+    """Within some um, but at the rims of the wave, and all of it within the tolerance.  Where a path turns at once in
+    the stock the tool turns over some tenths of a millimetre, and leaves no more than is reported."""
     program, task, part = reported
     machine = cut(task, program.parent / "compensated/part.ngc")
     assert machine.worst < 0.1
