@@ -148,7 +148,7 @@ def integrated(cutter, depth, chip=CHIP, slices=4000, angles=4000, beside=None):
         k = np.where(on_cone, np.pi / 2 - cutter.taper, np.pi / 2)
     else:
         low = z < cutter.corner
-        k = np.where(low, np.arccos(np.clip(1 - z / cutter.corner, -1, 1)), np.pi / 2)
+        k = np.where(low, np.arccos(np.clip(1 - z / max(cutter.corner, 1e-12), -1, 1)), np.pi / 2)
         r = cutter.radius - cutter.corner + cutter.corner * np.sin(k)
     phi = (np.arange(angles) + 0.5) / angles * np.pi
     s, c = np.sin(phi), np.cos(phi)
