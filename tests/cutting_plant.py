@@ -157,7 +157,8 @@ def ball_force(field, tip, axis, feed, radius, chip, teeth, out):
         for m in range(angles + 1):
             s, co = np.sin(m * dphi), np.cos(m * dphi)
             p = centre + radius * (sk * (s * x + co * y) - ck * axis)
-            d = ball_height(field, p[0], p[1]) - p[2] if p[2] < 0 else -1.0
+            within = p[2] < 0 and 0 <= p[0] <= 120
+            d = ball_height(field, p[0], p[1]) - p[2] if within else -1.0
             g[m] = min(d, radius * (sk * s * v[0] + sk * co * v[1] - ck * v[2]))
         for m in range(angles):
             phi, width = bite(g[m], g[m + 1], m, dphi)

@@ -14,10 +14,10 @@ DEG = np.pi / 180
 BLOCK = block([0, -60, -40], [200, 60, 0])
 
 
-def expected(direction, width, depth, cutter=FLAT):
+def expected(direction, width, depth, cutter=FLAT, chip=CHIP):
     entry, out = engagement(direction, width, 2 * cutter.radius)
     cut = Engagement(2 * cutter.radius, cutter.teeth, cutter.helix, depth, entry, out, KNOWN)
-    return mean_force(cut, np.array([CHIP]))[0], entry, out
+    return mean_force(cut, np.array([chip]))[0], entry, out
 
 
 def place(cut, row):
@@ -96,6 +96,31 @@ def test_a_ramp_cuts_with_its_bottom_too():
         20 * 16 * 5 + np.pi * 64 * 20 * slope
     )  # mm3: the sides at their mean depth, and the disc's descent
     assert cut.volume[1] / MM**3 == pytest.approx(volume, rel=0.005)
+    # linear in the depth, so its mean is that of the middle; the chip of the sides is that of the way in the plane
+    side, _, _ = expected("slot", 16 * MM, 5 * MM, chip=CHIP * np.cos(3 * DEG))
+    thrust = 3 * FLAT.radius * (KNOWN.cutting[1] * CHIP * np.sin(3 * DEG) + KNOWN.edge[1])
+    force = side + np.array([0, 0, thrust])
+    assert np.linalg.norm(cut.mean[1, :3] - force) < 0.005 * np.linalg.norm(force)
+
+
+def test_a_helical_ramp_removes_what_its_columns_say():
+    """Half a turn on a radius of 10 mm, down by 3 mm: a column is cut as deep as the tool last covers it."""
+    none = np.full((2, 3), np.nan)
+    centre, normal, sweep = none.copy(), none.copy(), none[:, 0].copy()
+    centre[1], normal[1], sweep[1] = [0.1, 0, -2 * MM], [0, 0, 1], np.pi
+    path = path_through(
+        [[110, 0, -2], [90, 0, -5]],
+        kinds=[Kind.PTP, Kind.CIRC],
+        arcs=Arcs(centre=centre, normal=normal, sweep=sweep),
+    )
+    cut = run(path, BLOCK, FLAT)
+    x, y = np.meshgrid(np.arange(-17.975, 18, 0.05), np.arange(-7.975, 18, 0.05))
+    depth = np.zeros(x.shape)
+    for angle in np.linspace(0, np.pi, 1801):
+        covered = np.hypot(x - 10 * np.cos(angle), y - 10 * np.sin(angle)) < 8
+        depth[covered] = 2 + 3 * angle / np.pi
+    volume = depth.sum() * 0.05**2 - np.pi * 64 * 2  # the first place is where it stands already
+    assert cut.volume[1] / MM**3 == pytest.approx(volume, rel=0.005)
 
 
 def test_a_plunge_is_the_thrust_of_its_end_edges():
@@ -112,8 +137,10 @@ def test_a_plunge_is_the_thrust_of_its_end_edges():
     assert cut.exit[1] - cut.entry[1] == pytest.approx(2 * np.pi, abs=1e-6)
 
 
-def integrated(cutter, depth, chip=CHIP, slices=4000, angles=4000):
-    """The mean force and the area across the feed of a slot, by plain quadrature over height and angle."""
+def integrated(cutter, depth, chip=CHIP, slices=4000, angles=4000, beside=None):
+    """The mean force and the area across the feed of a slot, by plain quadrature over height and angle.
+
+    beside [m]: what a row so far to the right left is cut."""
     z = (np.arange(slices) + 0.5) / slices * depth
     if cutter.taper is not None:
         r = np.minimum(cutter.tip + z * np.tan(cutter.taper), cutter.radius)
@@ -121,13 +148,15 @@ def integrated(cutter, depth, chip=CHIP, slices=4000, angles=4000):
         k = np.where(on_cone, np.pi / 2 - cutter.taper, np.pi / 2)
     else:
         low = z < cutter.corner
-        k = np.where(low, np.arccos(np.clip(1 - z / cutter.corner, -1, 1)), np.pi / 2)
+        k = np.where(low, np.arccos(np.clip(1 - z / max(cutter.corner, 1e-12), -1, 1)), np.pi / 2)
         r = cutter.radius - cutter.corner + cutter.corner * np.sin(k)
     phi = (np.arange(angles) + 0.5) / angles * np.pi
     s, c = np.sin(phi), np.cos(phi)
     sk, ck, r = (v[:, None] for v in (np.sin(k), np.cos(k), r))
     thick = sk * s
     area = depth / slices / sk * np.pi / angles
+    if beside is not None:
+        area = np.where(r * c > r - beside, area, 0.0)
     weight = area * cutter.teeth / (2 * np.pi)
     t, n, a = (
         (cutting * chip * thick + edge) * weight
@@ -153,6 +182,23 @@ def test_slots_of_curved_cutters(cutter, depth, limit):
     force, rate = integrated(cutter, depth * MM)
     assert np.linalg.norm(cut.mean[1, :3] - force) < limit * np.linalg.norm(force)
     assert cut.volume[1] == pytest.approx(rate * 10 * MM, rel=limit)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("beside", [2.0, 0.5, 0.2])
+@pytest.mark.parametrize(
+    ("cutter", "depth", "limit"),
+    [(BALL, 1.3, 0.02), (BULL, 4.7, 0.005), (CONE, 3.7, 0.005), (FLAT, 5.0, 0.005)],
+    ids=lambda value: getattr(value, "shape", None),
+)
+def test_rows_beside_one_another(cutter, depth, limit, beside):
+    """A second row at the depth of the first: walls of balls, bulls and cones with some ae."""
+    points = [[60, -beside, -depth], [140, -beside, -depth], [95, 0, -depth], [105, 0, -depth]]
+    kinds = [Kind.PTP, Kind.LIN, Kind.PTP, Kind.LIN]
+    cut = run(path_through(points, kinds=kinds), BLOCK, cutter)
+    force, rate = integrated(cutter, depth * MM, beside=beside * MM)
+    assert np.linalg.norm(cut.mean[3, :3] - force) < limit * np.linalg.norm(force)
+    assert cut.volume[3] == pytest.approx(rate * 10 * MM, rel=limit)
 
 
 @pytest.mark.sample(1)

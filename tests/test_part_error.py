@@ -130,6 +130,40 @@ def test_grooves_of_a_ball_in_three_and_five_axes(tilt):
     assert error[groove] == pytest.approx(true, abs=NEAR)
 
 
+@pytest.mark.slow
+def test_a_groove_of_a_ball_up_and_down_is_the_envelope_of_its_places():
+    """A surface of free form, the ball shifted by another vector at each place: along each normal what is left ends
+    where the first of all its places does."""
+    x = np.linspace(-60, 60, 121)
+    rise = lambda x: -3 + 1.5 * np.sin(x / 9)  # noqa: E731
+
+    def shift_at(x):
+        return np.stack([0.03 * np.sin(x / 8), 0.05 * np.cos(x / 11), 0.04 * np.sin(x / 7 + 1)], axis=1)
+
+    def moved(motion, share):
+        at = x[motion - 1] + share * (x[motion] - x[motion - 1])
+        return shift_at(at), np.zeros((len(motion), 3))
+
+    points, normals, error = errors_of(
+        path_through(np.column_stack([x, 0 * x, rise(x)])), BOX, moved, BALL, count=40_000
+    )
+    chosen = np.flatnonzero(
+        (np.abs(points[:, 1]) < 2.5) & (np.abs(points[:, 0]) < 40) & (points[:, 2] < -0.5)
+    )
+    chosen = chosen[:: max(len(chosen) // 200, 1)]
+    fine = np.linspace(-60, 60, 240_001)
+    middle = np.column_stack([fine, 0 * fine, np.interp(fine, x, rise(x)) + 5.0]) + shift_at(fine)
+    true = []
+    for point, normal in zip(points[chosen], normals[chosen], strict=True):
+        out = middle - point
+        along = out @ normal
+        rest = 25.0 - np.einsum("ki,ki->k", out, out) + along**2
+        true.append((along - np.sqrt(np.where(rest >= 0, rest, np.nan)))[rest >= 0].min())
+    assert len(chosen) > 100
+    assert np.abs(true).max() > 0.04
+    assert error[chosen] == pytest.approx(np.array(true), abs=NEAR)
+
+
 def test_a_tilted_flank_is_a_plane_that_is_shifted():
     lean = np.array([0.0, -np.sin(0.3), np.cos(0.3)])
     path = path_through([[-60, 30, -15], [60, 30, -15]], axes=[lean, lean])

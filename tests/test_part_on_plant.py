@@ -19,7 +19,7 @@ from postproc.workflows.preparation import Request, prepare
 BASE = np.array([1.450, -0.100, 0.600])
 DOWN = np.diag([1.0, -1.0, -1.0])  # A 0, B 0, C 180
 RADIUS, WALL = 8.0, 32.5
-PASSES = (14, 22, 27)  # lines that lead past the wall
+PASSES = (14, 22, 31, 36)  # lines that lead past the wall
 
 
 def targets(text):

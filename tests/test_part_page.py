@@ -166,9 +166,9 @@ def test_a_browser_shows_part_robot_and_force(window, page, wide, scheme):
     after = shown.pixels("#part")
     assert blue(posted) > 0.02
     assert blue(after) < 0.1 * blue(posted)
-    # the arrow is there, and turns with the motion: line 92 goes back along X, line 60 forth
+    # the arrow is there, and turns with the motion: line 120 goes back along X, line 60 forth
     heads = {}
-    for line in (60, 92):
+    for line in (60, 120):
         web.fill("#line", str(line))
         web.keyboard.press("Tab")
         assert web.locator("#part-line").inner_text().startswith(f"line {line}: G1")
@@ -176,7 +176,7 @@ def test_a_browser_shows_part_robot_and_force(window, page, wide, scheme):
         assert len(arrow) > 100
         thin = np.cov(arrow.T)
         heads[line] = np.degrees(np.arctan2(2 * thin[0, 1], thin[1, 1] - thin[0, 0])) / 2
-    assert abs(heads[60] - heads[92]) > 20
+    assert abs(heads[60] - heads[120]) > 20
     web.uncheck("#part-force")
     assert len(green(shown.pixels("#part"))) == 0
     # the robot fills the view on demand, is above and beside the part, and goes away

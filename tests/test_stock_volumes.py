@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from stock_cases import BALL, BULL, CONE, FLAT, MM, block, path_through, run
 
-from postproc.toolpath import Kind
+from postproc.toolpath import Arcs, Kind
 
 manifold3d = pytest.importorskip("manifold3d")
 
@@ -85,6 +85,65 @@ def five_axis(seed, cutter):
 def test_turning_motions_remove_what_the_solids_say(cutter):
     found, solid = five_axis(1, cutter)
     assert found == pytest.approx(solid, rel=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cutter", [FLAT, BALL], ids=lambda cutter: cutter.shape)
+@pytest.mark.parametrize("leans", [((0.25, 0.0), (-0.2, 0.15)), ((0.3, 0.0), (-0.3, 0.0))])
+def test_an_arc_along_which_the_tool_tilts_removes_what_the_solids_say(cutter, leans):
+    """Half a circle while the spindle turns over some 25 to 33 deg: within 1 %, by solids of 60 steps."""
+    middle, radius, steps = np.array([30.0, 20.0, -5.0]), 13.0, 60
+    ends = middle + radius * np.array([[1.0, 0, 0], [-1.0, 0, 0]])
+    axes = np.column_stack([leans, np.ones(2)])
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    none = np.full((2, 3), np.nan)
+    centre, normal, sweep = none.copy(), none.copy(), none[:, 0].copy()
+    centre[1], normal[1], sweep[1] = middle * MM, [0.0, 0.0, 1.0], np.pi
+    arcs = Arcs(centre=centre, normal=normal, sweep=sweep)
+    cut = run(path_through(ends, axes, [Kind.PTP, Kind.CIRC], arcs), block(LOW, HIGH), cutter)
+    share = np.linspace(0, 1, steps + 1)[:, None]
+    round_ = middle + radius * np.column_stack(
+        [np.cos(np.pi * share[:, 0]), np.sin(np.pi * share[:, 0]), 0 * share[:, 0]]
+    )
+    angle = np.arccos(axes[0] @ axes[1])
+    turned = (np.sin((1 - share) * angle) * axes[0] + np.sin(share * angle) * axes[1]) / np.sin(angle)
+    solid = volume_by_solids(round_, turned, cutter)
+    upright = run(path_through(ends, None, [Kind.PTP, Kind.CIRC], arcs), block(LOW, HIGH), cutter)
+    assert cut.volume[1] / MM**3 == pytest.approx(solid, rel=0.01)
+    if cutter is FLAT:  # the tilt counts
+        assert abs(upright.volume[1] / MM**3 / solid - 1) > 0.05
+
+
+@pytest.mark.parametrize("cutter", [BALL, FLAT, BULL], ids=lambda cutter: cutter.shape)
+def test_the_distance_to_a_motion_that_turns_is_the_least_of_its_places(cutter):
+    """Random short motions with turns up to 5 deg, points near their surface: against 2001 places of each."""
+    from stock_cases import sweeps_of
+
+    from postproc.process.stock.distance import pose_distance, swept_distance
+
+    random = np.random.default_rng(5)
+    near = 0
+    for _ in range(12):
+        lean = random.normal(0, 0.1, 2)
+        axes = np.array([[*lean, 1.0], [*(lean + random.normal(0, 0.04, 2)), 1.0]])
+        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+        start = np.array([30.0, 20.0, -6.0])
+        points = np.array([start, start + random.uniform(-1.5, 1.5, 3)])
+        sweeps, _ = sweeps_of(path_through(points, axes), block(LOW, HIGH), cutter)
+        numbers = np.array([one.numbers for one in sweeps.cutters])
+        for point in points[0] + random.uniform(-9, 9, (25, 3)):
+            x, y, z = point * MM
+            for j in range(len(sweeps.rows)):
+                true = min(
+                    pose_distance(sweeps.rows, numbers, j, t, x, y, z) for t in np.linspace(0, 1, 2001)
+                )
+                found = swept_distance(sweeps.rows, numbers, j, x, y, z, 0.01)
+                if abs(true) < 0.01:
+                    near += 1
+                    assert -1e-9 < true - found < 2e-9 + 1e-6 * (cutter is not BALL)
+                bound = swept_distance(sweeps.rows, numbers, j, x, y, z, 1e-4)
+                assert (bound > 1e-4 and true > 1e-4 - 1e-9) or bound <= max(found, -1e-4) + 1e-9
+    assert near > 200
 
 
 def main():

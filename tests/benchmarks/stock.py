@@ -1,9 +1,10 @@
 """What the simulation of the stock costs: processor time and memory of programs of short motions in a block.
 
-    python -m tests.benchmarks.stock --sizes 1000,4000,16000 [--stock 1,2,4] [--part 100000]
+    python -m tests.benchmarks.stock --sizes 1000,4000,16000 [--stock 1,2,4] [--part 100000] [--five-axes]
 
 Zigzag in levels of 2 mm of 4 mm between the rows, motions of 1 mm, a cutter of 16 mm; every level ends with a rapid.
-``--stock``: the block of the last size made so many times larger in each direction of the plane.
+``--stock``: the block of the last size made so many times larger in each direction of the plane.  ``--five-axes``: a
+ball of 10 mm in rows of 0.5 mm and levels of 0.5 mm, whose spindle swings by 17 deg to either side along its rows.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from part_cases import constant, sweeps_of
-from stock_cases import FLAT, block, path_through, run
+from stock_cases import BALL, FLAT, block, path_through, run
 
 from postproc.part.deflected_sweeps import deflect
 from postproc.part.surface import find_surface
@@ -46,12 +47,28 @@ def program(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array(points[:count]), np.array(kinds[:count])
 
 
-def measure(count: int, larger: float = 1.0) -> tuple[float, float, int]:
+def ball_program(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """(count, 3) tip positions [mm] and spindle directions (count, 3) of rows in levels."""
+    row = np.arange(-3, LENGTH + 3, 1.0)
+    many = np.arange(count)
+    index, place = many // len(row), many % len(row)
+    x = row[np.where(index % 2 == 0, place, len(row) - 1 - place)]
+    across = 2 * int(WIDTH)
+    y, level = 0.5 * (index % across), index // across
+    z = -0.5 * (level + 1) - 0.3 * np.sin(x / 15) - 0.3
+    lean = np.column_stack([0 * x, np.sin(0.3 * np.sin(x / 20)), np.cos(0.3 * np.sin(x / 20))])
+    tips = np.column_stack([x, y, z]) + 5.0 * ([0, 0, 1] - lean)
+    return tips, lean
+
+
+def measure(count: int, larger: float = 1.0, five: bool = False) -> tuple[float, float, int]:
     """Processor seconds, peak memory [GB] of the process so far, and the motions that cut."""
     points, kinds = program(count)
+    tips, axes = ball_program(count)
+    path = path_through(tips, axes) if five else path_through(points, kinds=kinds)
     start = time.process_time()
     size = [LENGTH * larger, WIDTH * larger, 0]
-    cut = run(path_through(points, kinds=kinds), block([0, 0, -60], size), FLAT)
+    cut = run(path, block([0, 0, -60], size), BALL if five else FLAT)
     used = time.process_time() - start
     return used, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, int(cut.cuts.sum())
 
@@ -81,6 +98,7 @@ def main() -> None:
     parser.add_argument("--sizes", default="1000,4000,16000")
     parser.add_argument("--stock", default="1")
     parser.add_argument("--part", type=int, default=0, help="measure the part instead, at so many points")
+    parser.add_argument("--five-axes", action="store_true")
     given = parser.parse_args()
     if given.part:
         measure_part(50, 1000)
@@ -92,13 +110,13 @@ def main() -> None:
                 )
             )
         return
-    measure(50)  # compiles
+    measure(50, five=given.five_axes)  # compiles
     sizes = [int(word) for word in given.sizes.split(",")]
     rows = [(size, 1.0) for size in sizes]
     rows += [(sizes[-1], float(word)) for word in given.stock.split(",") if float(word) != 1.0]
     print("motions  stock  cut     CPU s  us a motion  GB")
     for size, larger in rows:
-        used, memory, cut = measure(size, larger)
+        used, memory, cut = measure(size, larger, given.five_axes)
         print(
             f"{size:7}  {larger:5g}  {cut:6}  {used:5.2f}  {used / size * 1e6:11.0f}  {memory:.2f}",
             flush=True,

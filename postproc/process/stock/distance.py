@@ -20,8 +20,11 @@ RADIUS, CORNER, LENGTH, TIP, TAPER, COSINE = range(6)
 angle (-1: no taper) and its cosine."""
 
 _GOLDEN = 0.6180339887498949
-_STEPS = 30  # of golden sections: 1e-6 of the motion
 _PLACE = 1e-9  # m: of the place on a line where it is nearest
+_SHORT, _FEET = (
+    1e-6,
+    6,
+)  # m: the place of a foot on the way of a ball, and the steps to it: errors are its square by R
 
 
 TIP_POINT, STEP, AXIS, TURN, CENTRE, NORMAL, ANGLE, MODE, CUTTER, REMOVES = 0, 3, 6, 9, 12, 15, 18, 19, 20, 21
@@ -253,6 +256,35 @@ def _round(sweeps: Floats, cutters: Floats, j: int, x: float, y: float, z: float
 
 
 @compiled
+def _below_ball(sweeps: Floats, cutters: Floats, j: int, x: float, y: float, z: float) -> tuple[bool, float]:
+    """Whether the point is nearest to the round end of a ball along sweep ``j``, and its distance [m]: at the foot on
+    the way of the ball's middle, which is almost straight."""
+    c = int(sweeps[j, CUTTER])
+    corner = cutters[c, CORNER]
+    if cutters[c, TAPER] >= 0.0 or cutters[c, RADIUS] > corner:
+        return False, 0.0
+    wx, wy, wz = sweeps[j, TURN], sweeps[j, TURN + 1], sweeps[j, TURN + 2]
+    t = 0.5
+    for _ in range(_FEET):
+        tip, axis = tip_at(sweeps, j, t), axis_at(sweeps, j, t)
+        ux, uy, uz = x - tip[0], y - tip[1], z - tip[2]
+        vx, vy, vz = ux - corner * axis[0], uy - corner * axis[1], uz - corner * axis[2]
+        dx = sweeps[j, STEP] + corner * (wy * axis[2] - wz * axis[1])
+        dy = sweeps[j, STEP + 1] + corner * (wz * axis[0] - wx * axis[2])
+        dz = sweeps[j, STEP + 2] + corner * (wx * axis[1] - wy * axis[0])
+        square = dx * dx + dy * dy + dz * dz
+        if square < _SHORT * _SHORT:
+            return False, 0.0
+        to = min(max(t + (vx * dx + vy * dy + vz * dz) / square, 0.0), 1.0)
+        step = abs(to - t)
+        if step * step * square < _SHORT * _SHORT:
+            below = ux * axis[0] + uy * axis[1] + uz * axis[2] < corner
+            return below, np.sqrt(vx * vx + vy * vy + vz * vz) - corner
+        t = to
+    return False, 0.0
+
+
+@compiled
 def swept_distance(
     sweeps: Floats, cutters: Floats, j: int, x: float, y: float, z: float, enough: float
 ) -> float:
@@ -271,10 +303,20 @@ def swept_distance(
     half += 0.5 * half * turn_of(sweeps, j)
     if middle - half > enough or middle <= -enough:
         return middle - half if middle > 0.0 else middle
+    if sweeps[j, ANGLE] == 0.0:
+        found, d = _below_ball(sweeps, cutters, j, x, y, z)
+        if found:
+            return min(d, middle)
     low, high = 0.0, 1.0
     t1, t2 = 1.0 - _GOLDEN, _GOLDEN
     f1, f2 = pose_distance(sweeps, cutters, j, t1, x, y, z), pose_distance(sweeps, cutters, j, t2, x, y, z)
-    for _ in range(_STEPS):
+    length = 2.0 * half
+    while (high - low) * length > _PLACE:
+        least = min(f1, f2)
+        if least - (high - low) * length > enough:
+            return least - (high - low) * length
+        if least <= -enough:
+            return least
         if f1 < f2:
             high, t2, f2 = t2, t1, f1
             t1 = high - _GOLDEN * (high - low)

@@ -31,6 +31,7 @@ _NO_MOVE = 1e-7  # m
 _SAME_SPEED = 0.001
 _LEAST_CHIP, _LARGEST_CHIP = 0.0005 * MM, 0.2
 """[m] and of the diameter: feeds per tooth beyond have another unit than it seems."""
+_SMALL = 10 * MM  # a blank that is no longer, or one of 10 m in metres
 
 
 @dataclass(frozen=True, eq=False)
@@ -369,4 +370,6 @@ def _beside(
         f"the tip moves in {box(points.min(axis=0), points.max(axis=0))}" if len(points) else "nothing cuts"
     )
     message = f"no motion cuts: the blank is in {box(low, high)}, and {moves} (mm)"
-    return Finding("STK008", message, str(process.path), process.line)
+    small = float((high - low).max()) < _SMALL
+    help = "The blank is stated in mm: is it in metres?" if small else ""
+    return Finding("STK008", message, str(process.path), process.line, help=help)

@@ -21,6 +21,7 @@ _EDGES = ("teeth", "helix", "spindle", "material", "coefficients", "ci95")
 _SHAPE_KEYS = {"bull": ("corner_radius",), "cone": ("angle", "tip_diameter"), "drill": ("point_angle",)}
 _FAR = 100_000.0  # mm
 _MOST_TEETH = 1000
+_LEAST_DIAMETER = 0.1  # mm: below it no robot mills, and 0.016 is 16 in metres
 
 
 @dataclass(frozen=True)
@@ -166,6 +167,10 @@ def _cutter(
         return section.number(key, low=1e-3, high=most, unit="mm") * MM
 
     radius = 0.5 * length("diameter") if commented is None else commented.radius
+    if commented is None and 2 * radius < _LEAST_DIAMETER * MM:
+        message = f"{2 * radius / MM:g} mm is thinner than any cutter of a robot"
+        help = f"is it in metres? state mm: diameter: {2 * radius / MM * 1000:g}"
+        raise section.error("YML004", message, "diameter", help)
     edge = length("length") if "length" in section else None
     corner, tip, taper = 0.0, 0.0, None
     if commented is not None:
