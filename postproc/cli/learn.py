@@ -8,6 +8,7 @@ import click
 
 from postproc.cli.common import Out, insertion_options, page_option, program_options, require_suffix
 from postproc.cli.decimal_option import Decimal
+from postproc.learning.deviation_signs import SIGNS
 
 
 @click.command()
@@ -38,6 +39,12 @@ from postproc.cli.decimal_option import Decimal
     "--new-history",
     is_flag=True,
     help="Replace that record: only the parts that are named count.",
+)
+@click.option(
+    "--positive",
+    type=click.Choice(SIGNS),
+    help="State again what a positive DEV of MEASURED is, where neither the points show it nor a line `# checked:` or"
+    " measured places (LRN020).",
 )
 @click.option(
     "--known-force",
@@ -84,6 +91,7 @@ def learn(
     gain: float,
     history: Path | None,
     new_history: bool,
+    positive: str | None,
     known_force: float | None,
     push: Path | None,
     csv_to: Path | None,
@@ -138,6 +146,7 @@ def learn(
         gain=gain,
         history=history,
         new_history=new_history,
+        positive=positive or "",
         csv=csv_to,
         page=page,
         json=out.json_file,

@@ -18,10 +18,10 @@ from postproc.learning.excluded_points import MOST_OUTLIERS, OUTLIERS_EACH, find
 from postproc.learning.measured_part import MeasuredPart
 
 LIKELIER = 3.0
-"""Logarithm: how much likelier the deviations must be with the other sign."""
+"""Logarithm: how much likelier the deviations must be of a compensated program than of the original."""
 
 EXCHANGED, MOST_PAIRS = 10.0, 60
-"""The same if the deviations of two features are exchanged; pairs that are tried."""
+"""The same if they count the other way or are exchanged between two features; pairs that are tried."""
 
 OFFSET = 0.1 * MM
 """[m] An offset of all deviations that no tool has."""
@@ -93,21 +93,26 @@ class FirstLook:
 
 
 def check_deviations(
-    look: FirstLook, feature: Sequence[str], original: bool, file: str, several: bool = False
+    look: FirstLook,
+    feature: Sequence[str],
+    original: bool,
+    file: str,
+    several: bool = False,
+    sign_seen: bool = False,
 ) -> list[Finding]:
     """Whether the deviations are too small for the probe, or far likelier with the other sign, exchanged between two of
     the features (K,), or of a compensated program where the ``original`` is stated; ``several``: other parts show
-    the causes too, which are not known here."""
+    the causes too, which are not known here; ``sign_seen``: the part itself shows the sign."""
     enough = EXCHANGED if several else LIKELIER
     quiet = _check_size(look, file)
     if quiet:
         return quiet
     present = look.evidence(look.deviation, look.errors)
-    turned = look.evidence(-look.deviation, look.errors) - present
+    turned = -np.inf if sign_seen else look.evidence(-look.deviation, look.errors) - present
     compensated = look.evidence(look.deviation, 0 * look.errors) - present if original else -np.inf
     if compensated > max(enough if several else 0.0, turned):
         return [wrong_program(compensated, file)]
-    if turned > enough:
+    if turned > EXCHANGED:  # closer odds are judged with the effects that each reading asks for
         return [wrong_sign(turned, file)]
     return _check_offset(look, present, file) or _check_features(look, feature, present, file)
 
@@ -129,8 +134,8 @@ def wrong_sign(gain: float, file: str) -> Finding:
         " as positive, or the reverse"
     )
     help = (
-        "check the line `# positive:` against a place that was cut too deep; columns MX, MY, MZ with measured places"
-        " show the sign"
+        "look at a place with a large deviation again, correct `# positive:` if it is wrong, and add the line"
+        " `# checked: X Y Z material_left` (or material_missing), or the measured places as columns MX, MY, MZ"
     )
     return Finding("LRN004", message, file, help=help)
 

@@ -125,11 +125,12 @@ def draw(row: str, seed: int, shops: tuple[Path, Path], learner: Learner) -> dic
         "hidden": list(hidden),
     }
     deviation = probe(home, before, chosen, noise, rng)
+    found = deviation.copy()
     if "outliers" in options:
         bad = rng.choice(count, max(1, round(options["outliers"] * count)), replace=False)
         deviation[bad] += 0.3e-3 * rng.choice([-1.0, 1.0], len(bad))
     name = f"{row}.csv"
-    write_csv(shop / name, home, chosen, deviation, first, noise)
+    write_csv(shop / name, home, chosen, deviation, first, noise, found=found)
     out = f"learned_{row}"
     shutil.rmtree(shop / out, ignore_errors=True)
     asked = {"gain": options.get("gain", 1.0), "new_history": True}
