@@ -57,7 +57,7 @@ def test_a_sign_that_is_stated_again_is_refused_only_where_it_is_absurd(monkeypa
     assert codes(monkeypatch, odds, repeated=True) == expected
 
 
-@pytest.mark.parametrize(("learnt", "gain"), [(0.002, 1.0), (1.0, 0.002), (0.0, 1.0)])
+@pytest.mark.parametrize(("learnt", "gain"), [(0.1, 1.0), (1.0, 0.1), (0.0, 1.0)])
 def test_a_next_part_that_is_no_worse_either_way_is_only_warned_of(monkeypatch, learnt, gain):
     assert codes(monkeypatch, 0.0, learnt=learnt, gain=gain) == ["LRN019"]
 

@@ -39,8 +39,9 @@ HOPELESS = 100.0
 SURE = float(np.log(1000.0))
 """Logarithm: how much likelier the deviations are as stated where nothing but `# positive:` states their sign."""
 
-WORSE = 0.1
-"""Of the scatter of the probe: by so much the deviations of the next part may grow."""
+WORSE = 1.0
+"""Times the scatter of the probe: less is no worse.  Errors that could grow by more leave deviations of four times the
+scatter, which a second look can tell."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -213,7 +213,7 @@ def aligned_rms(surface: Surface, errors: np.ndarray) -> float:
     return float(np.sqrt(np.mean((errors - columns @ best) ** 2)))
 
 
-SEEN = 5.0
+SEEN = 4.0
 """Times the scatter of the probe."""
 
 

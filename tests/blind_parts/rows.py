@@ -155,9 +155,11 @@ def draw(row: str, seed: int, shops: tuple[Path, Path], learner: Learner) -> dic
             name = f"{row}_{number}.csv"
             write_csv(shop / name, home, chosen, probe(home, after, chosen, noise, rng), kept, noise)
             measured.append(name)
-            told = learner.ask(shop, measured, out, **asked)
-            if told["refused"]:
+            more = learner.ask(shop, measured, out, **asked)
+            if more["refused"]:
+                answer["later_refused"] = more["refused"]
                 break
+            told = more
     answer["after"], answer["parts"] = parts[-1], parts
     again = cut(home, truth, plant, programs[0], rng)
     answer |= _others(home, again, chosen, deviation, noise, told)
@@ -178,7 +180,7 @@ def _planned(home: Surface, count: int) -> np.ndarray:
     text = [",".join(f"{one:.7f}" for one in row) for row in rows]
     offered.write_text("\n".join(["X,Y,Z,NX,NY,NZ", *text]) + "\n")
     plan(LearnRequest(home.request, (offered,), csv=measure), count)
-    places = np.array([line.split(",")[:3] for line in measure.read_text().splitlines()[6:]], float)
+    places = np.array([line.split(",")[:3] for line in measure.read_text().splitlines()[7:]], float)
     return np.argmin(((places[:, None] - home.point[None]) ** 2).sum(axis=2), axis=1)
 
 
