@@ -22,7 +22,9 @@ def program(tmp_path_factory):
     return path
 
 
-def codes_of(program, row, seed, hidden, worn, count, sign=1.0, checked=False, places=False, **options) -> list[str]:
+def codes_of(
+    program, row, seed, hidden, worn, count, sign=1.0, checked=False, places=False, **options
+) -> list[str]:
     """Codes of a part of the blind benchmark, whose DEV count the other way with the sign -1."""
     rng = np.random.default_rng([seed, zlib.crc32(row.encode())])
     surface = surface_of(program.parent, *surface_points(COUNT, rng))

@@ -109,7 +109,8 @@ def learn(
     cut/ beside the next one.
 
     PROGRAM is the original, not the compensated one. MEASURED are CSVs with the columns X,Y,Z,NX,NY,NZ,DEV (nominal
-    point and outward normal in $BASE, mm) and the comments positive, alignment, cut_with, sha256 and sigma_mm.
+    point and outward normal in $BASE, mm) and the comments positive, alignment, cut_with, sha256 and sigma_mm.  Where
+    the points do not show the sign of DEV, a second look at the part does: checked (or columns MX,MY,MZ).
 
     \b
     Examples:
@@ -167,7 +168,7 @@ def learn(
                 f"{chosen.points} of {chosen.offered} points: the errors of the surface may be"
                 f" {chosen.before_mm:.3f} mm RMS before they are measured, {chosen.after_mm:.3f} mm after"
             )
-            click.echo(f"wrote {chosen.path}")
+            click.echo(f"wrote {chosen.path}; DEV and the comments above the header are to be filled in")
         return
     with out.refusals(str(program)), out.stages() as stage:
         done = run(request, stage)

@@ -18,8 +18,8 @@ TELLING = 4.0
 """Standard deviations of the probe from which on a deviation shows its sign: one in 30,000 does not."""
 
 HELP = (
-    "write `# checked: X Y Z material_left` (or material_missing): a point of this file with a large deviation, and what"
-    " a second look at the part, by a gauge or a caliper, found there"
+    "write `# checked: X Y Z material_left` (or material_missing): a point of this file with a large deviation, and"
+    " what a second look at the part, by a gauge or a caliper, found there"
 )
 
 _WORDS = re.compile(r"[\s;]+|,\s+")

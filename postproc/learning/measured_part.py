@@ -113,7 +113,12 @@ def read_measured_part(path: Path) -> MeasuredPart:
     try:
         return _read(path)
     except Refusal as refusal:
-        raise Refusal(*(one if one.help else replace(one, help=ROWS) for one in refusal.findings)) from None
+        raise Refusal(
+            *(
+                one if one.help or one.code == "FIL001" else replace(one, help=ROWS)
+                for one in refusal.findings
+            )
+        ) from None
 
 
 def _read(path: Path) -> MeasuredPart:
@@ -127,7 +132,7 @@ def _read(path: Path) -> MeasuredPart:
     deviation = table.numbers_or_nan("dev")
     rows = np.flatnonzero(np.isfinite(deviation))
     if len(rows) < LEAST:
-        message = f"{len(rows)} points have a deviation where at least {LEAST} are needed"
+        message = f"{len(rows)} of {len(table)} rows have a deviation, where at least {LEAST} are needed"
         raise _wrong(table, table.header_line, message, "fill in DEV (mm)")
     if len(rows) > MOST:
         raise _wrong(

@@ -31,7 +31,10 @@ from postproc.learning.attribution import Attribution, attribute, evidence_of
 from postproc.learning.candidates import Circumstances
 from postproc.learning.causes import CausePrediction
 from postproc.learning.plausible import EXCHANGED, LIKELIER, wrong_program, wrong_sign
-from postproc.learning.promise import alignment_basis, aligned
+from postproc.learning.promise import aligned, alignment_basis
+
+EVEN = 2.0
+"""Odds below it are told as even."""
 
 HOPELESS = 100.0
 """Logarithm: a reading that is so much less likely by the known causes gets no effects of its own."""
@@ -47,13 +50,15 @@ scatter, which a second look can tell."""
 @dataclass(frozen=True, eq=False)
 class StatedPart:
     """A part as its ``file`` states it: its ``points`` (K,) among those of all parts; ``original``: the uncompensated
-    program cut it; ``sign_seen``: the part itself shows its sign; ``sign_repeated``: the user stated it again."""
+    program cut it; ``sign_seen``: the part itself shows its sign; ``sign_repeated``: the user stated it again;
+    ``largest``: X Y Z [mm] of its largest deviation, in words."""
 
     points: Bools
     original: bool
     file: str
     sign_seen: bool
     sign_repeated: bool = False
+    largest: str = "X Y Z"
 
 
 def check_readings(
@@ -93,8 +98,8 @@ def check_readings(
         return []
     for turned, other, part in unsure:
         if not part.sign_repeated and _is_worse(result, other, parts[-1].points, gain):
-            return [_unseen_sign("LRN020", turned, part.file)]
-    return [_unseen_sign("LRN019", unsure[0][0], unsure[0][2].file)]
+            return [_unseen_sign("LRN020", turned, part)]
+    return [_unseen_sign("LRN019", unsure[0][0], unsure[0][2])]
 
 
 def _is_worse(result: Attribution, other: Floats, last: Bools, gain: float) -> bool:
@@ -127,15 +132,23 @@ def _likeliest(
     return best
 
 
-def _unseen_sign(code: str, gain: float, file: str) -> Finding:
+def _unseen_sign(code: str, gain: float, part: StatedPart) -> Finding:
     """That nothing but a comment states the sign; gain: logarithm of how much likelier the other one is."""
     message = (
-        f"the points do not show the sign of DEV (exp({gain:.1f}) times as likely with the other one): only"
-        " `# positive:` states it, and a wrong one doubles the error of the next part"
+        f"the points do not show the sign of DEV (the other one is {_odds(gain)}): only `# positive:` states it, and a"
+        " wrong one doubles the error of the next part"
     )
     help = (
-        "look at a place with a large deviation again and add the line `# checked: X Y Z material_left` (or"
-        " material_missing), or the measured places as columns MX, MY, MZ; `--positive` states the sign again without"
-        " a look at the part"
+        f"look at the part again at {part.largest}, and add what is found there as `# checked: {part.largest}"
+        " material_left` or `... material_missing`; or add the measured places as columns MX, MY, MZ; `--positive` only"
+        " states the sign again"
     )
-    return Finding(code, message, file, help=help)
+    return Finding(code, message, part.file, help=help)
+
+
+def _odds(gain: float) -> str:
+    """Of a logarithm, in words."""
+    ratio = float(np.exp(min(abs(gain), HOPELESS)))
+    if ratio < EVEN:
+        return "about as likely"
+    return f"{ratio:.{0 if ratio >= 10 else 1}f} times {'likelier' if gain > 0 else 'less likely'}"

@@ -112,6 +112,7 @@ def _learn(request: LearnRequest, stage: Stage) -> Learned:
             str(part.file),
             part.sign_seen,
             request.positive == part.sign,
+            _largest(part),
         )
         for number, part in enumerate(parts)
     ]
@@ -168,6 +169,11 @@ def _learn(request: LearnRequest, stage: Stage) -> Learned:
         exit=exit_code(findings, request.strict),
     )
     return _published(request, job, matched, (remembered, programs), learned, stage)
+
+
+def _largest(part: MeasuredPart) -> str:
+    """X Y Z [mm] of the largest deviation."""
+    return " ".join(f"{one:.3f}" for one in part.point[np.argmax(np.abs(part.deviation))] / MM)
 
 
 def _folder(request: LearnRequest) -> Path:
