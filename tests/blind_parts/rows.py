@@ -230,20 +230,25 @@ def _others(
 
 def _explained(home: Surface, alone: dict[str, float]) -> np.ndarray:
     """(K,) [m] what causes explain at all points of the surface."""
+    prediction = predicted(home)
+    return prediction.errors(np.array([alone.get(cause.name, 0.0) for cause in prediction.causes]))
+
+
+def predicted(surface: Surface) -> CausePrediction:
+    """Of all points of a surface, as the program that was compensated by the shipped robot file cuts them."""
     from .cutting import commands
 
-    job = home.program
+    job = surface.program
     task = job.ready.task
     base = task.base[job.motions.rows[:1]]
     rotation = base.rotation[0]
-    surface = (base.position + 1e-3 * home.point @ rotation.T, home.normal @ rotation.T)
-    sent = commands(home, home.folder / "compensated" / "part.src")
-    states = touched_points(task, job.spindle, (home.row, home.share), surface, sent)
+    touched = (base.position + 1e-3 * surface.point @ rotation.T, surface.normal @ rotation.T)
+    sent = commands(surface, surface.folder / "compensated" / "part.src")
+    states = touched_points(task, job.spindle, (surface.row, surface.share), touched, sent)
     causes = robot_causes(job.ready.model)
-    causes += force_causes(job.operations.which[home.row], job.operations.names, PriorKnowledge())
-    causes += tool_causes(states, job.tool[home.row], job.ball, False)
-    x = np.array([alone.get(cause.name, 0.0) for cause in causes])
-    return CausePrediction(states, job.ready.model, tuple(causes)).errors(x)
+    causes += force_causes(job.operations.which[surface.row], job.operations.names, PriorKnowledge())
+    causes += tool_causes(states, job.tool[surface.row], job.ball, False)
+    return CausePrediction(states, job.ready.model, tuple(causes))
 
 
 def _elsewhere(
