@@ -35,8 +35,16 @@ FAR_OUT = 5.0
 REMAINING = 1.8
 """Deviations of left-out points that remain are too large for a probe from so many times its scatter on."""
 
-UNEXPLAINED = 0.6
-"""Share of the deviations of left-out points that may remain."""
+UNEXPLAINED, PER_POINT = 0.6, 0.5
+"""Share of the deviations of left-out points that may remain where the causes make the deviations of a point, in the
+mean, less than exp(0.5) times likelier than a scatter without order does."""
+
+CONFIRMED = 5.0
+"""Logarithm: how much likelier the deviations must be by the causes than by a scatter without order, which rows in
+another order are: at most one such file in 150 is (Markov's inequality)."""
+
+SCATTERS = np.append(WHITES, [0.2 * MM, 0.4 * MM, 0.8 * MM, 1.6 * MM])
+"""[m] of deviations that have no order."""
 
 ROBUST = 6
 """Rounds in which points that lie elsewhere lose their weight."""
@@ -263,13 +271,32 @@ def check_explained(result: Attribution, file: str) -> list[Finding]:
     sigma = own.layout.sigma
     remains = float(np.sqrt(np.mean(rest**2))) > REMAINING * float(np.sqrt(np.mean(sigma**2)))
     share = float(np.mean(rest**2) / max(float(np.mean(aligned**2)), 1e-18))
-    if remains and share > UNEXPLAINED:
+    gain, count = _gain_over_scatter(result), len(result.deviation)
+    if remains and (gain < CONFIRMED or (share > UNEXPLAINED and gain < PER_POINT * count)):
         message = (
-            f"the causes predict held-out points no better than nothing does ({100 * share:.0f} % of the squares remain"
-            "): rows may be in another order than their deviations, or the part is another one"
+            f"the {count} points do not confirm each other ({100 * share:.0f} % of the squares of held-out deviations"
+            " remain): rows may be in another order than their deviations, the part may be another one, or the points"
+            " are too few"
         )
-        findings.append(Finding("LRN004", message, file))
+        help = (
+            "compare some rows with the measuring report; measure more points, or those that --plan chooses"
+        )
+        findings.append(Finding("LRN004", message, file, help=help))
     return findings
+
+
+def _gain_over_scatter(result: Attribution) -> float:
+    """Logarithm of how much likelier the deviations are by causes and smooth error than by a scatter that no two points
+    share, after the alignment, outliers at their cost."""
+    count = len(result.deviation)
+    none, zero = np.zeros((count, 0)), np.zeros(count)
+    scatters = [
+        Explanation(result.layout, SmoothField(white=float(white)), result.deviation, none, zero)
+        for white in SCATTERS
+    ]
+    best = max(one.evidence - one.surface.logarithm for one in scatters)
+    own = result.explained.evidence - result.surface.logarithm
+    return own + OUTLIERS_EACH * int((~result.kept).sum()) - best
 
 
 def _word(unit: str) -> str:
