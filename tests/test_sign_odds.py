@@ -16,8 +16,8 @@ def fail(*_):
 
 
 def codes(monkeypatch, odds, seen=False, repeated=False, learnt=1.0, gain=1.0) -> list[str]:
-    """Of a part of which exp(``odds``) is the ratio of the other sign; ``learnt``: share of the deviations that the next
-    program takes off."""
+    """Of a part with the odds exp(``odds``) of the other sign; ``learnt``: share of the deviations that the next program
+    takes off."""
     monkeypatch.setattr(other_readings, "evidence_of", lambda *_: 7.0 + odds)
     monkeypatch.setattr(other_readings, "attribute", fail)
     deviation = np.linspace(-1e-4, 1e-4, COUNT)

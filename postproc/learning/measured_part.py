@@ -151,15 +151,15 @@ def _read(path: Path) -> MeasuredPart:
     spring = _flag(table, stated, "spring_pass", ("true", "false"), "write true or false") == "true"
     length = np.linalg.norm(normal[rows], axis=1, keepdims=True)
     time = table.numbers_or_nan("t") if "t" in table else np.full(len(table), np.nan)
-    left = deviation * (1 if sign == "material_left" else -1)
-    seen = sign_shown(table, (point, normal), left, rows, freedoms)
-    seen |= check_by_hand(table, stated.get("checked", (0, "")), point, left[rows], sigma, rows)
+    outward = deviation * (1 if sign == "material_left" else -1)
+    seen = sign_shown(table, (point, normal), outward, rows, freedoms)
+    seen |= check_by_hand(table, stated.get("checked", (0, "")), point, outward[rows], sigma, rows)
     return MeasuredPart(
         file=path,
         digest=table.digest,
         point=frozen(point[rows] * MM),
         normal=frozen(normal[rows] / length),
-        deviation=frozen(left[rows] * MM),
+        deviation=frozen(outward[rows] * MM),
         sigma=frozen(sigma * MM),
         feature=_texts(table, "feature", rows),
         operation=_texts(table, "operation", rows),
