@@ -256,9 +256,9 @@ def check_explained(result: Attribution, file: str) -> list[Finding]:
             findings.append(Finding("LRN004", message, file))
     surface = result.surface
     if surface.size >= FIELDS[-1] or surface.white >= WHITES[-1]:
-        kind = "smooth error" if surface.size >= FIELDS[-1] else "error of each point for itself"
+        kind = "a smooth error" if surface.size >= FIELDS[-1] else "an error of each point for itself"
         message = (
-            f"they need a {kind} of {max(surface.size, surface.white) / MM:.2f} mm or more, which nothing in a"
+            f"they need {kind} of {max(surface.size, surface.white) / MM:.2f} mm or more, which nothing in a"
             " cell makes: rows may be in another order, or the radius of the probe is still in the deviations"
         )
         findings.append(Finding("LRN004", message, file))
