@@ -76,3 +76,9 @@ def test_a_program_that_is_no_worse_either_way_needs_no_second_look(program):
     codes = codes_of(program, *PLAIN, gain=0.01)
     assert "LRN019" in codes
     assert "LRN020" not in codes
+
+
+def test_a_worn_gear_is_no_radius_of_a_probe(program):
+    """A gap moves most of the points by 0.1 mm to one side."""
+    codes = codes_of(program, "worn_backlash", 40007, ("backlash",), 4.0, 120, checked=True)
+    assert "LRN004" not in codes
