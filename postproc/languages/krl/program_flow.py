@@ -58,6 +58,7 @@ from postproc.languages.krl.statement_effects import (
 )
 from postproc.languages.krl.vectorised import Item, VectorisedLines
 from postproc.toolpath import Annotation
+from postproc.toolpath.meant_comments import meant_to_speak
 
 _ANNOTATION = re.compile(rb";[ \t]*(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
 
@@ -343,7 +344,7 @@ class ProgramFlow(Calls):
         note = Annotation(len(run.rows), text, item.line)
         if _ANNOTATION.match(item.comment):
             run.rows.annotations.append(note)
-        elif item.kind == StatementKind.COMMENT:
+        elif item.kind == StatementKind.COMMENT or meant_to_speak(text):
             self.comments.setdefault(item.line, note)
 
     def _later(self, item: Statement) -> None:
