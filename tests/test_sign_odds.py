@@ -16,7 +16,7 @@ def fail(*_):
 
 
 def codes(monkeypatch, odds, seen=False, repeated=False, learnt=1.0, gain=1.0) -> list[str]:
-    """Of a part with the odds exp(``odds``) of the other sign; ``learnt``: share of its deviations that is taken off."""
+    """Of a part with the odds exp(``odds``) of the other sign; ``learnt``: share of it that is taken off."""
     monkeypatch.setattr(other_readings, "evidence_of", lambda *_: 7.0 + odds)
     monkeypatch.setattr(other_readings, "attribute", fail)
     deviation = np.linspace(-1e-4, 1e-4, COUNT)
