@@ -16,6 +16,7 @@ from postproc.api_place import Force, PathLike, as_path, assign, place, stated_f
 from postproc.api_robot import diagnose, identify, map, plan
 from postproc.base.findings import Finding, Refusal
 from postproc.base.units import MM
+from postproc.learning.deviation_signs import SIGNS
 from postproc.report.assignment import PartAssignment
 from postproc.report.batched import Batched
 from postproc.report.checked import Checked
@@ -249,6 +250,7 @@ def learn(
     gain: float = 1.0,
     history: PathLike | None = None,
     new_history: bool = False,
+    positive: Literal["", "material_left", "material_missing"] = "",
     known_force: float | None = None,
     push: PathLike | None = None,
     output: PathLike | None = None,
@@ -262,8 +264,9 @@ def learn(
 
     path: the original program; measured: CSVs of deviations; known_force: half width of the 95 % interval of all forces
     as a share; push: readings of a push test; gain: share of what was learnt that is applied; history: record of the
-    parts of earlier runs, beside the cell without; new_history: whatever that holds; output: folder of the next
-    program, robot file and force factors; csv: one row a point; page: the result as HTML.
+    parts of earlier runs, beside the cell without; new_history: whatever that holds; positive: what a positive DEV is,
+    stated again where the points do not show it; output: folder of the next program, robot file and force factors; csv:
+    one row a point; page: the result as HTML.
     """
     from postproc.workflows.learn import LearnRequest
     from postproc.workflows.learn import learn as run
@@ -284,6 +287,7 @@ def learn(
             gain=_share(gain),
             history=as_path(history),
             new_history=new_history,
+            positive=_sign(positive),
             known_force=known_force,
             push=as_path(push),
             output=as_path(output),
@@ -348,6 +352,12 @@ def _share(gain: float) -> float:
     if not isinstance(gain, (int, float)) or not 0.0 <= gain <= 1.0:
         raise ValueError(f"gain must be a share of the correction, 0 .. 1, and is {gain!r}")
     return gain
+
+
+def _sign(positive: str) -> str:
+    if positive not in ("", *SIGNS):
+        raise ValueError(f"positive is one of {', '.join(SIGNS)}, not {positive!r}")
+    return positive
 
 
 def _shared_points(choice: str) -> str:

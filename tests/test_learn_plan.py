@@ -72,9 +72,9 @@ def test_the_command_writes_a_file_to_fill(tmp_path):
     done = CliRunner().invoke(main, words)
     assert done.exit_code == 0, done.output
     lines = measure.read_text().splitlines()
-    assert len(lines) == 5 + 1 + 12
+    assert len(lines) == 6 + 1 + 12
     given = np.array([row.split(",")[:3] for row in rows[1:]], float)
-    chosen = np.array([line.split(",")[:3] for line in lines[6:]], float)
+    chosen = np.array([line.split(",")[:3] for line in lines[7:]], float)
     assert np.abs(chosen[:, None] - given[None]).max(axis=2).min(axis=1).max() < 2e-5
     unfilled = CliRunner().invoke(main, ["learn", str(SAMPLE / "part.src"), str(measure)])
     assert unfilled.exit_code == 1

@@ -97,7 +97,7 @@ def test_a_comment_that_is_not_understood_is_refused_with_its_line(tmp_path, hea
         (COLUMNS, [*ROWS[:7], "90000,2,3,0,0,1,0.1"], "away"),
         (COLUMNS, [*ROWS[:7], "1,2,3,0,0,1,x"], "not a number"),
         (COLUMNS, [*ROWS, ROWS[3]], "occurs twice"),
-        (COLUMNS, ROWS[:4], "4 points"),
+        (COLUMNS, ROWS[:4], "4 of 4 rows"),
         (COLUMNS, [f"0.0{i},0.01,0.0{i},0,0,1,0.00{i}" for i in range(8)], "within"),
         (COLUMNS, [f"{i},{i * i},0,0,0,1,0.000{i}" for i in range(8)], "no deviation exceeds"),
         (COLUMNS, [f"{i},{i * i},0,0,0,1,0" for i in range(8)], "zero"),

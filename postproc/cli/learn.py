@@ -8,6 +8,7 @@ import click
 
 from postproc.cli.common import Out, insertion_options, page_option, program_options, require_suffix
 from postproc.cli.decimal_option import Decimal
+from postproc.learning.deviation_signs import SIGNS
 
 
 @click.command()
@@ -38,6 +39,12 @@ from postproc.cli.decimal_option import Decimal
     "--new-history",
     is_flag=True,
     help="Replace that record: only the parts that are named count.",
+)
+@click.option(
+    "--positive",
+    type=click.Choice(SIGNS),
+    help="State again what a positive DEV of MEASURED is, where neither the points show it nor a line `# checked:` or"
+    " measured places (LRN020).",
 )
 @click.option(
     "--known-force",
@@ -84,6 +91,7 @@ def learn(
     gain: float,
     history: Path | None,
     new_history: bool,
+    positive: str | None,
     known_force: float | None,
     push: Path | None,
     csv_to: Path | None,
@@ -101,7 +109,8 @@ def learn(
     cut/ beside the next one.
 
     PROGRAM is the original, not the compensated one. MEASURED are CSVs with the columns X,Y,Z,NX,NY,NZ,DEV (nominal
-    point and outward normal in $BASE, mm) and the comments positive, alignment, cut_with, sha256 and sigma_mm.
+    point and outward normal in $BASE, mm) and the comments positive, alignment, cut_with, sha256 and sigma_mm.  Where
+    the points do not show the sign of DEV, a second look at the part does: checked (or columns MX,MY,MZ).
 
     \b
     Examples:
@@ -138,6 +147,7 @@ def learn(
         gain=gain,
         history=history,
         new_history=new_history,
+        positive=positive or "",
         csv=csv_to,
         page=page,
         json=out.json_file,
@@ -158,7 +168,7 @@ def learn(
                 f"{chosen.points} of {chosen.offered} points: the errors of the surface may be"
                 f" {chosen.before_mm:.3f} mm RMS before they are measured, {chosen.after_mm:.3f} mm after"
             )
-            click.echo(f"wrote {chosen.path}")
+            click.echo(f"wrote {chosen.path}; DEV and the comments above the header are to be filled in")
         return
     with out.refusals(str(program)), out.stages() as stage:
         done = run(request, stage)

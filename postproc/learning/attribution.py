@@ -154,11 +154,13 @@ def attribute(
     rivals: list[Likelier] = []
     alternatives: tuple[str, ...] = ()
     stand_in = ""
+    offered: list[MissingEffect] | None = None
     while search:
-        noise = float(np.median(layout.sigma[kept]))
-        every = np.ones(len(kept), bool)
-        everything = _linearised(prediction, deviation, layout, x, every, explained.surface)
-        offered = candidates(prediction, x, around, noise, [one.name for one in joined])
+        everything = explained
+        if not kept.all():
+            every = np.ones(len(kept), bool)
+            everything = _linearised(prediction, deviation, layout, x, every, explained.surface)
+        offered = candidates(prediction, x, around, _noise_of(layout, kept), [one.name for one in joined])
         ranked = weigh_effects(explained, everything, offered, kept)
         rivals = [Likelier(one.effect.name, one.gain) for one in ranked]
         if not rivals or rivals[0].gain < NAMED or len(named) == MOST_NAMED:
@@ -180,6 +182,7 @@ def attribute(
                 # the first one only stood for this one
                 named, joined = [rivals[0]], [best.effect]
                 prediction, x, kept, explained = alone.prediction, alone.x, alone.kept, alone.explained
+                offered = None
                 break
         if len(alike) > 1:
             alternatives, stand_in = tuple(one.effect.name for one in alike), best.effect.name
@@ -190,8 +193,8 @@ def attribute(
     verdict = _verdict(bool(alternatives), bool(named), explained)
     mean, covariance = explained.causes()
     if search:
-        noise = float(np.median(layout.sigma[kept]))
-        offered = candidates(prediction, x, around, noise, [one.name for one in joined])
+        if offered is None:
+            offered = candidates(prediction, x, around, _noise_of(layout, kept), [one.name for one in joined])
         covariance = covariance + considered_covariance(explained, offered, np.flatnonzero(kept))
     root = prediction.before[1]
     standardised = np.full(len(deviation), np.nan)
@@ -212,6 +215,11 @@ def attribute(
         verdict,
         standardised,
     )
+
+
+def _noise_of(layout: Layout, kept: Bools) -> float:
+    """[m] of a point."""
+    return float(np.median(layout.sigma[kept]))
 
 
 def _with_effect(
@@ -243,8 +251,7 @@ def _instead_of_first(
 ) -> _Hypothesis | None:
     """The effect that was named second, without the one that was named first: near the null one of two that are alike
     may look likelier that is not so at its true size."""
-    noise = float(np.median(layout.sigma[bare.kept]))
-    offered = candidates(bare.prediction, bare.x, around, noise)
+    offered = candidates(bare.prediction, bare.x, around, _noise_of(layout, bare.kept))
     own = next((one for one in offered if (one.name, one.wide) == (second.name, second.wide)), None)
     if own is None:
         return None

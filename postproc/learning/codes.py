@@ -153,9 +153,17 @@ CODES = define(
         "LRN019": Code(
             "warning",
             "sign of the deviations is not shown",
-            meaning="A compensated program leaves errors that are about as likely with the other sign.",
+            meaning="The points are about as likely with the other sign, and no second look at the part is stated.",
             consequence="If `# positive:` is wrong, the next part has twice the error; the part after it shows that.",
-            action="Add the measured places (MX, MY, MZ), or probe a place that surely has more material than nominal.",
+            action="Add the measured places (MX, MY, MZ), or `# checked:` with a place that was looked at again.",
+            example="A sign that --positive states again.",
+        ),
+        "LRN020": Code(
+            "error",
+            "sign of the deviations needs a second statement",
+            meaning="A compensated program leaves errors that are about as likely with the other sign.",
+            consequence="If `# positive:` is wrong, the next part would have twice the error.",
+            action="Look at one place of the part again and add `# checked:`, or the measured places (MX, MY, MZ).",
             example="A first part of a robot and forces that are nearly as stated.",
         ),
     }

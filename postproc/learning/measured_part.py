@@ -13,6 +13,8 @@ from postproc.base.arrays import Floats, Ints, frozen
 from postproc.base.findings import Finding, Refusal, nearest
 from postproc.base.tables import CsvTable, is_missing, read_table
 from postproc.base.units import MM
+from postproc.learning.checked_place import check_by_hand
+from postproc.learning.deviation_signs import SIGNS
 from postproc.learning.measured_places import PLACES as MEASURED
 from postproc.learning.measured_places import sign_shown
 
@@ -25,8 +27,8 @@ KEYS = (
     "probe_radius",
     "spring_pass",
     "base",
+    "checked",
 )
-SIGNS = ("material_left", "material_missing")
 ALIGNMENTS = ("free", "datum", "partial")
 FREEDOMS = ("x", "y", "z", "a", "b", "c")
 PLACE, NORMAL = ("x", "y", "z"), ("nx", "ny", "nz")
@@ -61,8 +63,8 @@ class MeasuredPart:
     names of each point, "" without; program_line (K,): 0 without; part (K,): number of the part in this file; time
     (K,) [s], NaN without; line (K,): of the file.  freedoms: of x, y, z, a, b, c those in which the part was aligned to
     its own points; cut_with: file of the program that cut it, "" for the original; program_digest: what the file states
-    of it; base: number of the base, None without; sign_seen: measured places show on which side of the nominal ones
-    they lie, as the deviations say.
+    of it; base: number of the base, None without; sign: what the file says that a positive DEV is; sign_seen: measured
+    places or a place that was checked by hand lie on that side of the nominal ones that the deviations say.
     """
 
     file: Path
@@ -83,6 +85,7 @@ class MeasuredPart:
     spring_pass: bool
     base: int | None
     findings: tuple[Finding, ...]
+    sign: str = SIGNS[0]
     sign_seen: bool = False
 
     def __len__(self) -> int:
@@ -110,7 +113,12 @@ def read_measured_part(path: Path) -> MeasuredPart:
     try:
         return _read(path)
     except Refusal as refusal:
-        raise Refusal(*(one if one.help else replace(one, help=ROWS) for one in refusal.findings)) from None
+        raise Refusal(
+            *(
+                one if one.help or one.code == "FIL001" else replace(one, help=ROWS)
+                for one in refusal.findings
+            )
+        ) from None
 
 
 def _read(path: Path) -> MeasuredPart:
@@ -124,7 +132,7 @@ def _read(path: Path) -> MeasuredPart:
     deviation = table.numbers_or_nan("dev")
     rows = np.flatnonzero(np.isfinite(deviation))
     if len(rows) < LEAST:
-        message = f"{len(rows)} points have a deviation where at least {LEAST} are needed"
+        message = f"{len(rows)} of {len(table)} rows have a deviation, where at least {LEAST} are needed"
         raise _wrong(table, table.header_line, message, "fill in DEV (mm)")
     if len(rows) > MOST:
         raise _wrong(
@@ -143,15 +151,15 @@ def _read(path: Path) -> MeasuredPart:
     spring = _flag(table, stated, "spring_pass", ("true", "false"), "write true or false") == "true"
     length = np.linalg.norm(normal[rows], axis=1, keepdims=True)
     time = table.numbers_or_nan("t") if "t" in table else np.full(len(table), np.nan)
-    seen = sign_shown(
-        table, (point, normal), deviation * (1 if sign == "material_left" else -1), rows, freedoms
-    )
+    outward = deviation * (1 if sign == "material_left" else -1)
+    seen = sign_shown(table, (point, normal), outward, rows, freedoms)
+    seen |= check_by_hand(table, stated.get("checked", (0, "")), point, outward[rows], sigma, rows)
     return MeasuredPart(
         file=path,
         digest=table.digest,
         point=frozen(point[rows] * MM),
         normal=frozen(normal[rows] / length),
-        deviation=frozen(deviation[rows] * (MM if sign == "material_left" else -MM)),
+        deviation=frozen(outward[rows] * MM),
         sigma=frozen(sigma * MM),
         feature=_texts(table, "feature", rows),
         operation=_texts(table, "operation", rows),
@@ -165,6 +173,7 @@ def _read(path: Path) -> MeasuredPart:
         spring_pass=spring,
         base=_base(table, stated),
         findings=tuple(findings),
+        sign=sign,
         sign_seen=seen,
     )
 

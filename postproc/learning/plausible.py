@@ -18,13 +18,14 @@ from postproc.learning.excluded_points import MOST_OUTLIERS, OUTLIERS_EACH, find
 from postproc.learning.measured_part import MeasuredPart
 
 LIKELIER = 3.0
-"""Logarithm: how much likelier the deviations must be with the other sign."""
+"""Logarithm: how much likelier the deviations must be of a compensated program than of the original."""
 
 EXCHANGED, MOST_PAIRS = 10.0, 60
-"""The same if the deviations of two features are exchanged; pairs that are tried."""
+"""The same if they count the other way or are exchanged between two features; pairs that are tried."""
 
-OFFSET = 0.1 * MM
-"""[m] An offset of all deviations that no tool has."""
+OFFSET = 0.13 * MM
+"""[m] An offset of all deviations that no tool has, but the smallest tips of probes (0.15 mm of radius): worn gears may
+shift most of them by 0.1 mm."""
 
 QUIET, FEW = 0.5, 12
 """Deviations of so many times the stated scatter are too small; fewer points do not show it."""
@@ -35,8 +36,16 @@ FAR_OUT = 5.0
 REMAINING = 1.8
 """Deviations of left-out points that remain are too large for a probe from so many times its scatter on."""
 
-UNEXPLAINED = 0.6
-"""Share of the deviations of left-out points that may remain."""
+UNEXPLAINED, PER_POINT = 0.6, 0.5
+"""Share of the deviations of left-out points that may remain where the causes make the deviations of a point, in the
+mean, less than exp(0.5) times likelier than a scatter without order does."""
+
+CONFIRMED = 5.0
+"""Logarithm: how much likelier the deviations must be by the causes than by a scatter without order, which rows in
+another order are: at most one such file in 150 is (Markov's inequality)."""
+
+SCATTERS = np.append(WHITES, [0.2 * MM, 0.4 * MM, 0.8 * MM, 1.6 * MM])
+"""[m] of deviations that have no order."""
 
 ROBUST = 6
 """Rounds in which points that lie elsewhere lose their weight."""
@@ -93,21 +102,26 @@ class FirstLook:
 
 
 def check_deviations(
-    look: FirstLook, feature: Sequence[str], original: bool, file: str, several: bool = False
+    look: FirstLook,
+    feature: Sequence[str],
+    original: bool,
+    file: str,
+    several: bool = False,
+    sign_seen: bool = False,
 ) -> list[Finding]:
     """Whether the deviations are too small for the probe, or far likelier with the other sign, exchanged between two of
     the features (K,), or of a compensated program where the ``original`` is stated; ``several``: other parts show
-    the causes too, which are not known here."""
+    the causes too, which are not known here; ``sign_seen``: the part itself shows the sign."""
     enough = EXCHANGED if several else LIKELIER
     quiet = _check_size(look, file)
     if quiet:
         return quiet
     present = look.evidence(look.deviation, look.errors)
-    turned = look.evidence(-look.deviation, look.errors) - present
+    turned = -np.inf if sign_seen else look.evidence(-look.deviation, look.errors) - present
     compensated = look.evidence(look.deviation, 0 * look.errors) - present if original else -np.inf
     if compensated > max(enough if several else 0.0, turned):
         return [wrong_program(compensated, file)]
-    if turned > enough:
+    if turned > EXCHANGED:  # closer odds are judged with the effects that each reading asks for
         return [wrong_sign(turned, file)]
     return _check_offset(look, present, file) or _check_features(look, feature, present, file)
 
@@ -129,8 +143,8 @@ def wrong_sign(gain: float, file: str) -> Finding:
         " as positive, or the reverse"
     )
     help = (
-        "check the line `# positive:` against a place that was cut too deep; columns MX, MY, MZ with measured places"
-        " show the sign"
+        "look at a place with a large deviation again, correct `# positive:` if it is wrong, and add the line"
+        " `# checked: X Y Z material_left` (or material_missing), or the measured places as columns MX, MY, MZ"
     )
     return Finding("LRN004", message, file, help=help)
 
@@ -243,9 +257,9 @@ def check_explained(result: Attribution, file: str) -> list[Finding]:
             findings.append(Finding("LRN004", message, file))
     surface = result.surface
     if surface.size >= FIELDS[-1] or surface.white >= WHITES[-1]:
-        kind = "smooth error" if surface.size >= FIELDS[-1] else "error of each point for itself"
+        kind = "a smooth error" if surface.size >= FIELDS[-1] else "an error of each point for itself"
         message = (
-            f"they need a {kind} of {max(surface.size, surface.white) / MM:.2f} mm or more, which nothing in a"
+            f"they need {kind} of {max(surface.size, surface.white) / MM:.2f} mm or more, which nothing in a"
             " cell makes: rows may be in another order, or the radius of the probe is still in the deviations"
         )
         findings.append(Finding("LRN004", message, file))
@@ -258,13 +272,32 @@ def check_explained(result: Attribution, file: str) -> list[Finding]:
     sigma = own.layout.sigma
     remains = float(np.sqrt(np.mean(rest**2))) > REMAINING * float(np.sqrt(np.mean(sigma**2)))
     share = float(np.mean(rest**2) / max(float(np.mean(aligned**2)), 1e-18))
-    if remains and share > UNEXPLAINED:
+    gain, count = _gain_over_scatter(result), len(result.deviation)
+    if remains and (gain < CONFIRMED or (share > UNEXPLAINED and gain < PER_POINT * count)):
         message = (
-            f"the causes predict held-out points no better than nothing does ({100 * share:.0f} % of the squares remain"
-            "): rows may be in another order than their deviations, or the part is another one"
+            f"the {count} points do not confirm each other ({100 * share:.0f} % of the squares of held-out deviations"
+            " remain): rows may be in another order than their deviations, the part may be another one, or the points"
+            " are too few"
         )
-        findings.append(Finding("LRN004", message, file))
+        help = (
+            "compare some rows with the measuring report; measure more points, or those that --plan chooses"
+        )
+        findings.append(Finding("LRN004", message, file, help=help))
     return findings
+
+
+def _gain_over_scatter(result: Attribution) -> float:
+    """Logarithm of how much likelier the deviations are by causes and smooth error than by a scatter that no two points
+    share, after the alignment, outliers at their cost."""
+    count = len(result.deviation)
+    none, zero = np.zeros((count, 0)), np.zeros(count)
+    scatters = [
+        Explanation(result.layout, SmoothField(white=float(white)), result.deviation, none, zero)
+        for white in SCATTERS
+    ]
+    best = max(one.evidence - one.surface.logarithm for one in scatters)
+    own = result.explained.evidence - result.surface.logarithm
+    return own + OUTLIERS_EACH * int((~result.kept).sum()) - best
 
 
 def _word(unit: str) -> str:

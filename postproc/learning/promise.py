@@ -43,12 +43,12 @@ def promise(result: Attribution, last: Bools, gain: float = 1.0) -> Promise:
     """What remains on a part like those at the points ``last`` (K,), the part that was cut last, if ``gain`` of all
     that was learnt is applied."""
     own = np.flatnonzero(last[result.kept])
-    rows, taken = result.kept_rows[own], _alignment_basis(result.layout.free[result.kept_rows[own]])
+    rows, taken = result.kept_rows[own], alignment_basis(result.layout.free[result.kept_rows[own]])
     variance = (
         held_out_variance(result.explained, own, taken) + (SCATTER * result.explained.by_force[own]) ** 2
     )
     withheld = (1 - gain) * (result.by_learning + result.by_field)[rows]
-    after = float(np.sqrt(HOPE**2 * np.mean(variance) + np.mean(_aligned(withheld, taken) ** 2)))
+    after = float(np.sqrt(HOPE**2 * np.mean(variance) + np.mean(aligned(withheld, taken) ** 2)))
     return Promise(measured_rms(result, last), after, LOWER * after, UPPER * after)
 
 
@@ -58,12 +58,9 @@ def held_out_variance(explained: Explanation, own: Ints, basis: Floats) -> Float
     prior = explained.columns @ explained.columns.T + explained.layout.field(explained.surface)
     follows = prior @ explained.inverse
 
-    def aligned(whole: Floats) -> Floats:
-        return whole - basis @ (basis.T @ whole)
-
-    remains = aligned((prior - follows @ prior)[np.ix_(own, own)])
+    remains = aligned((prior - follows @ prior)[np.ix_(own, own)], basis)
     remains = remains - (remains @ basis) @ basis.T
-    itself = np.diag(aligned(follows[np.ix_(own, own)])) ** 2 / np.diag(explained.inverse)[own]
+    itself = np.diag(aligned(follows[np.ix_(own, own)], basis)) ** 2 / np.diag(explained.inverse)[own]
     return np.asarray(np.maximum(np.diag(remains), 0.0) + itself)
 
 
@@ -74,15 +71,16 @@ def measured_rms(result: Attribution, of: Bools) -> float:
     if not len(own):
         return 0.0
     layout = result.explained.layout
-    aligned = _aligned(result.deviation[result.kept_rows[own]], _alignment_basis(layout.free[own]))
-    return float(np.sqrt(max(float(np.mean(aligned**2)) - float(np.mean(layout.sigma[own] ** 2)), 0.0)))
+    rest = aligned(result.deviation[result.kept_rows[own]], alignment_basis(layout.free[own]))
+    return float(np.sqrt(max(float(np.mean(rest**2)) - float(np.mean(layout.sigma[own] ** 2)), 0.0)))
 
 
-def _alignment_basis(free: Floats) -> Floats:
+def alignment_basis(free: Floats) -> Floats:
     """(J, A) orthonormal columns of the freedoms (J, A) that the alignment of these points takes out."""
     own = free[:, np.abs(free).any(axis=0)]
     return np.linalg.qr(own)[0] if own.shape[1] else np.zeros((len(free), 0))
 
 
-def _aligned(values: Floats, basis: Floats) -> Floats:
+def aligned(values: Floats, basis: Floats) -> Floats:
+    """(J, ...) values (J, ...) without what the orthonormal columns ``basis`` (J, A) of an alignment take out."""
     return np.asarray(values - basis @ (basis.T @ values))

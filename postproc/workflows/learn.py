@@ -59,7 +59,8 @@ class LearnRequest:
     """What the user asked for.  ``main``: the program, its cell, force and how it is written; ``measured``: files of
     parts that it cut; ``known_force``: half width of the 95 % interval of all forces as a share, as a gauge showed
     it; ``push``: readings of a push test; ``gain``: share of what was learnt that the next program applies;
-    ``history``: file of the record of parts, beside the cell without; ``new_history``: whatever it holds."""
+    ``history``: file of the record of parts, beside the cell without; ``new_history``: whatever it holds; ``positive``:
+    what a positive DEV of the files that are named is, stated again, "" without."""
 
     main: Request
     measured: tuple[Path, ...]
@@ -69,6 +70,7 @@ class LearnRequest:
     gain: float = 1.0
     history: Path | None = None
     new_history: bool = False
+    positive: str = ""
     csv: Path | None = None
     page: Path | None = None
     json: Path | None = None
@@ -88,7 +90,7 @@ def _learn(request: LearnRequest, stage: Stage) -> Learned:
     for path in request.measured:
         check_kind(path, PART)
     named = [read_measured_part(path) for path in request.measured]
-    _check_parts(named)
+    _check_parts(named, request.positive)
     job = read_job(main)
     record = request.history or record_path(job, main.program)
     remembered = remember(job, main, named, record, request.new_history, _folder(request))
@@ -104,13 +106,25 @@ def _learn(request: LearnRequest, stage: Stage) -> Learned:
     file = str(parts[0].file)
     look = FirstLook.of(prediction, matched.deviation, matched.layout)
     stated = [
-        StatedPart(matched.file == number, not part.cut_with, str(part.file), part.sign_seen)
+        StatedPart(
+            matched.file == number,
+            not part.cut_with,
+            str(part.file),
+            part.sign_seen,
+            request.positive == part.sign,
+            _largest(part),
+        )
         for number, part in enumerate(parts)
     ]
     for part in stated:
         rows = np.flatnonzero(part.points)
         wrong = check_deviations(
-            look.part(rows), [matched.feature[i] for i in rows], part.original, part.file, len(parts) > 1
+            look.part(rows),
+            [matched.feature[i] for i in rows],
+            part.original,
+            part.file,
+            len(parts) > 1,
+            part.sign_seen,
         )
         if wrong:
             raise Refusal(*wrong)
@@ -121,7 +135,7 @@ def _learn(request: LearnRequest, stage: Stage) -> Learned:
         message = f"the deviations determine no causes: {error}"
         raise Refusal(Finding("LRN004", message, file, help="check DEV and the base of the points")) from None
     wrong = check_explained(result, file)
-    readings = [] if wrong else check_readings(prediction, result, matched.around, stated)
+    readings = [] if wrong else check_readings(prediction, result, matched.around, stated, request.gain)
     wrong += [one for one in readings if one.severity == "error"]
     if wrong:
         raise Refusal(*wrong)
@@ -157,6 +171,11 @@ def _learn(request: LearnRequest, stage: Stage) -> Learned:
     return _published(request, job, matched, (remembered, programs), learned, stage)
 
 
+def _largest(part: MeasuredPart) -> str:
+    """X Y Z [mm] of the largest deviation."""
+    return " ".join(f"{one:.3f}" for one in part.point[np.argmax(np.abs(part.deviation))] / MM)
+
+
 def _folder(request: LearnRequest) -> Path:
     """Of the next program."""
     return request.output or request.main.program.parent / "learned"
@@ -189,14 +208,19 @@ def _unkept(parts: Sequence[MeasuredPart], history: Sequence[LearnedPart]) -> li
     return findings
 
 
-def _check_parts(parts: Sequence[MeasuredPart]) -> None:
-    """A part that is named twice would count twice.  Raises Refusal LRN001."""
+def _check_parts(parts: Sequence[MeasuredPart], positive: str) -> None:
+    """A part that is named twice would count twice, and a sign that is stated again must be that of each file.  Raises
+    Refusal LRN001."""
     seen: dict[str, MeasuredPart] = {}
     for part in parts:
         other = seen.setdefault(part.digest, part)
         if other is not part:
             message = f"{part.file.name} has the same content as {other.file.name}"
             raise Refusal(Finding("LRN001", message, str(part.file), help="name each part once"))
+        if positive and positive != part.sign:
+            message = f"the file says that a positive DEV is {part.sign}, the command that it is {positive}"
+            help = "one of them is wrong: look at a place of the part with a large deviation again"
+            raise Refusal(Finding("LRN001", message, str(part.file), help=help))
 
 
 def known_before(request: LearnRequest, job: CutProgram) -> PriorKnowledge:

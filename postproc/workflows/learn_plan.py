@@ -76,7 +76,7 @@ def plan(request: LearnRequest, count: int, stage: Stage = silent) -> LearnPlan:
 def _file(point: np.ndarray, normal: np.ndarray, feature: list[str]) -> bytes:
     """The file to fill: DEV is empty, and so is what only the shop knows."""
     stream = io.StringIO()
-    stream.write("# positive:\n# alignment:\n# cut_with:\n# sha256:\n# sigma_mm:\n")
+    stream.write("# positive:\n# checked:\n# alignment:\n# cut_with:\n# sha256:\n# sigma_mm:\n")
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(["X", "Y", "Z", "NX", "NY", "NZ", "DEV", "FEATURE"])
     for place, out, name in zip((point / MM).tolist(), normal.tolist(), feature, strict=True):

@@ -116,7 +116,8 @@ def main() -> None:
         from postproc.workflows.learn import LearnRequest, learn
         from postproc.workflows.preparation import Request
 
-        done = learn(LearnRequest(Request(folder / "part.src", force=""), (measured,)), stage)
+        main = Request(folder / "part.src", force="")
+        done = learn(LearnRequest(main, (measured,), positive="material_left"), stage)
         whole = time.process_time() - start
         used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
         motions = len((folder / "part.src").read_text().splitlines())

@@ -14,5 +14,6 @@ CSV of the part, and writes the next program, which the plant cuts; the truth st
     rows      the rows of the table, and one draw of each
     table     figures with 95 % intervals
     visible   how much a hidden effect shows in the deviations
+    bounds    the most that could be removed
     bad_files files with a mistake, of which none may be learnt from
 """

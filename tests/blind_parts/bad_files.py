@@ -2,7 +2,10 @@
 
     python -m tests.blind_parts.bad_files [--draws 20] [--seed 0] [--minutes M]
 
-Each draw cuts a part of its own; its file gets one mistake at a time, and one copy gets none.
+Each draw cuts a part of its own; its file gets one mistake at a time, and one copy gets none.  The sign is stated once
+in files without a further word, is that of a place that was looked at again in files ``(checked)``, and is shown by
+measured places in others.  Files with another mistake than the sign state it twice, by the command, so that no second
+look helps to find them.
 """
 
 from __future__ import annotations
@@ -23,8 +26,6 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 import numpy as np
 
 COUNT, NOISE = 100, 1e-5
-HEAD = 6
-"""Lines above the rows."""
 
 Lines = list[str]
 Cells = np.ndarray
@@ -36,14 +37,20 @@ def _numbers(
     """A mistake in the columns X, Y, Z, NX, NY, NZ, DEV (K, 7), or in others."""
 
     def spoil(lines: Lines, rng: np.random.Generator) -> Lines:
-        rows = [line.split(",") for line in lines[HEAD:]]
+        head = _head(lines)
+        rows = [line.split(",") for line in lines[head:]]
         cells = np.array([row[columns] for row in rows], float)
         change(cells, rng)
         for own, row in zip(cells, rows, strict=True):
             row[columns] = [f"{x:.6f}" for x in own]
-        return [*lines[:HEAD], *(",".join(row) for row in rows)]
+        return [*lines[:head], *(",".join(row) for row in rows)]
 
     return spoil
+
+
+def _head(lines: Lines) -> int:
+    """Lines above the rows."""
+    return next(i for i, line in enumerate(lines) if line.startswith("X,")) + 1
 
 
 MEASURED = slice(8, 11)
@@ -96,13 +103,14 @@ def _actual(cells: Cells, rng: np.random.Generator) -> None:
 
 def _features(lines: Lines, rng: np.random.Generator) -> Lines:
     """The deviations of two features are exchanged as far as there are points."""
-    rows = [line.split(",") for line in lines[HEAD:]]
+    head = _head(lines)
+    rows = [line.split(",") for line in lines[head:]]
     names = sorted({row[7] for row in rows if row[7].startswith("WALL")})
     first, second = rng.choice(names, 2, replace=False)
     one, other = ([i for i, row in enumerate(rows) if row[7] == name] for name in (first, second))
     for i, j in zip(one, other, strict=False):
         rows[i][6], rows[j][6] = rows[j][6], rows[i][6]
-    return [*lines[:HEAD], *(",".join(row) for row in rows)]
+    return [*lines[:head], *(",".join(row) for row in rows)]
 
 
 def _digest(lines: Lines, rng: np.random.Generator) -> Lines:
@@ -113,15 +121,17 @@ def _origin(cells: Cells, rng: np.random.Generator) -> None:
     cells[:, rng.integers(2)] += rng.choice([-1.0, -0.3, 0.3, 1.0])
 
 
-PLACES = " (with measured places)"
-GOOD = ("none", "none (by the original)", "none" + PLACES)
-UNSEEN = ("sign (compensated)",)
-"""Seen only where the errors are large, and warned of otherwise: not counted."""
+PLACES, CHECKED = " (with measured places)", " (checked)"
+ORIGINAL = ("none (by the original)", "sign (by the original)")
+GOOD = ("none", *ORIGINAL[:1], "none" + CHECKED, "none" + PLACES)
+ONCE = (*GOOD[:2], ORIGINAL[1], "sign")
+"""Files that state the sign once: a good one is asked for a second statement where its points do not show it."""
 
 MISTAKES: dict[str, Callable[[Lines, np.random.Generator], Lines]] = {
     **dict.fromkeys(GOOD, lambda lines, rng: lines),
+    ORIGINAL[1]: _numbers(_sign),
     "sign": _numbers(_sign),
-    "sign (compensated)": _numbers(_sign),
+    "sign" + CHECKED: _numbers(_sign),
     "sign" + PLACES: _numbers(_sign),
     "origin": _numbers(_origin),
     "columns X and Y": _columns(0, 1),
@@ -143,8 +153,7 @@ MISTAKES: dict[str, Callable[[Lines, np.random.Generator], Lines]] = {
     "places shuffled" + PLACES: _numbers(_places_shuffled, MEASURED),
     "places shifted by one" + PLACES: _numbers(_places_shifted, MEASURED),
 }
-"""A wrong sign is that of a part of the uncompensated program: on a well compensated one either sign is as likely, and
-those are counted by themselves, without and with measured places."""
+"""By the compensated program where the original is not named."""
 
 
 def main() -> None:
@@ -153,6 +162,7 @@ def main() -> None:
     from blind_parts.table import share_interval
     from blind_parts.truth import draw_truth
     from postproc.base.findings import Refusal
+    from postproc.learning.deviation_signs import SIGNS
     from postproc.workflows.learn import LearnRequest, learn
     from postproc.workflows.preparation import Request
     from postproc.workflows.program import compensate
@@ -165,7 +175,6 @@ def main() -> None:
     parser.add_argument("--details", action="store_true")
     chosen = parser.parse_args()
     codes: dict[str, list[str]] = {name: [] for name in chosen.only.split(",")}
-    unseen = dict.fromkeys(codes, 0)
     with tempfile.TemporaryDirectory() as name:
         original = write_shop(Path(name) / "shop")
         shop, compensated = original.parent, original.parent / "compensated" / "part.src"
@@ -185,36 +194,35 @@ def main() -> None:
                 for program in (compensated, original)
             }  # fmt: skip
             for mistake in codes:
-                cut_by = original if mistake in ("sign", GOOD[1]) else compensated
+                cut_by = original if mistake in ORIGINAL else compensated
                 stated = original if mistake == "the original named" else cut_by
                 path = shop / "m.csv"
-                write_csv(path, surface, every, read[cut_by], stated, NOISE, mistake.endswith(PLACES))
+                second = mistake.endswith(PLACES), mistake.endswith(CHECKED)
+                write_csv(path, surface, every, read[cut_by], stated, NOISE, *second)
                 path.write_text("\n".join([*MISTAKES[mistake](path.read_text().splitlines(), rng), ""]))
+                repeated = "" if mistake in ONCE or any(second) else SIGNS[0]
                 try:
-                    done = learn(LearnRequest(Request(original, force=""), (path,), dry_run=True))
-                    answer = "learnt" if done.promise.better else "nothing written"
-                    warned = [f for f in done.findings if f.code == "LRN019"]
-                    unseen[mistake] += answer == "learnt" and bool(warned)
-                    if chosen.details and warned:
-                        print(mistake, warned[0].message[:150])
+                    request = LearnRequest(
+                        Request(original, force=""), (path,), positive=repeated, dry_run=True
+                    )
+                    answer = "learnt" if learn(request).promise.better else "nothing written"
                 except Refusal as refusal:
                     answer = refusal.findings[0].code
                     if chosen.details:
                         print(mistake, refusal.findings[0].message[:150])
                 codes[mistake].append(answer)
     print(
-        "| mistake | files | learnt from % | of these warned of the sign | nothing written | refused by |\n"
-        + "| --- " * 6
-        + "|"
+        "| mistake | files | learnt from % | asked for a second statement % | nothing written | refused by |"
     )
+    print("| --- " * 6 + "|")
     for mistake, answers in codes.items():
         refused = sorted({one for one in answers if one.startswith("LRN")})
-        learnt = share_interval(answers.count("learnt"), len(answers))
+        learnt, asked = (share_interval(answers.count(word), len(answers)) for word in ("learnt", "LRN020"))
         print(
-            f"| {mistake} | {len(answers)} | {learnt} | {unseen[mistake]} | {answers.count('nothing written')}"
+            f"| {mistake} | {len(answers)} | {learnt} | {asked} | {answers.count('nothing written')}"
             f" | {', '.join(refused)} |"
         )
-    wrong = [one for mistake, answers in codes.items() if mistake not in GOOD + UNSEEN for one in answers]
+    wrong = [one for mistake, answers in codes.items() if mistake not in GOOD for one in answers]
     print(f"\n{wrong.count('learnt')} of {len(wrong)} files with a mistake are learnt from")
 
 

@@ -213,11 +213,16 @@ def aligned_rms(surface: Surface, errors: np.ndarray) -> float:
     return float(np.sqrt(np.mean((errors - columns @ best) ** 2)))
 
 
+SEEN = 4.0
+"""Times the scatter of the probe."""
+
+
 def write_csv(
     path: Path, surface: Surface, chosen: np.ndarray, deviation: np.ndarray, program: Path, noise: float,
-    places: bool = False,
+    places: bool = False, checked: bool = True, found: np.ndarray | None = None,
 ) -> None:  # fmt: skip
-    """The file of a measured part; ``places``: with the measured ones."""
+    """The file of a measured part; ``places``: with the measured ones; ``checked``: somebody looked again at the place
+    with the largest deviation, where that is large enough to be seen, and ``found`` (J,) [m], DEV without."""
     original = program.name == "part.src" and program.parent == surface.folder
     name = "original" if original else str(program.relative_to(surface.folder))
     lines = [
@@ -228,6 +233,11 @@ def write_csv(
         f"# sigma_mm: {1e3 * noise:g}",
         "X,Y,Z,NX,NY,NZ,DEV,FEATURE" + ",MX,MY,MZ" * places,
     ]
+    seen = deviation if found is None else found
+    largest = int(np.argmax(np.abs(seen)))
+    if checked and abs(seen[largest]) > SEEN * noise:
+        words = " ".join(f"{one:.3f}" for one in surface.point[chosen[largest]])
+        lines.insert(-1, f"# checked: {words} {'material_left' if seen[largest] > 0 else 'material_missing'}")
     for k, value in zip(chosen.tolist(), deviation.tolist(), strict=True):
         numbers = [*surface.point[k], *surface.normal[k], 1e3 * value]
         place = (surface.point[k] + 1e3 * value * surface.normal[k]).tolist() if places else []

@@ -125,11 +125,12 @@ def draw(row: str, seed: int, shops: tuple[Path, Path], learner: Learner) -> dic
         "hidden": list(hidden),
     }
     deviation = probe(home, before, chosen, noise, rng)
+    found = deviation.copy()
     if "outliers" in options:
         bad = rng.choice(count, max(1, round(options["outliers"] * count)), replace=False)
         deviation[bad] += 0.3e-3 * rng.choice([-1.0, 1.0], len(bad))
     name = f"{row}.csv"
-    write_csv(shop / name, home, chosen, deviation, first, noise)
+    write_csv(shop / name, home, chosen, deviation, first, noise, found=found)
     out = f"learned_{row}"
     shutil.rmtree(shop / out, ignore_errors=True)
     asked = {"gain": options.get("gain", 1.0), "new_history": True}
@@ -154,9 +155,11 @@ def draw(row: str, seed: int, shops: tuple[Path, Path], learner: Learner) -> dic
             name = f"{row}_{number}.csv"
             write_csv(shop / name, home, chosen, probe(home, after, chosen, noise, rng), kept, noise)
             measured.append(name)
-            told = learner.ask(shop, measured, out, **asked)
-            if told["refused"]:
+            more = learner.ask(shop, measured, out, **asked)
+            if more["refused"]:
+                answer["later_refused"] = more["refused"]
                 break
+            told = more
     answer["after"], answer["parts"] = parts[-1], parts
     again = cut(home, truth, plant, programs[0], rng)
     answer |= _others(home, again, chosen, deviation, noise, told)
@@ -177,7 +180,7 @@ def _planned(home: Surface, count: int) -> np.ndarray:
     text = [",".join(f"{one:.7f}" for one in row) for row in rows]
     offered.write_text("\n".join(["X,Y,Z,NX,NY,NZ", *text]) + "\n")
     plan(LearnRequest(home.request, (offered,), csv=measure), count)
-    places = np.array([line.split(",")[:3] for line in measure.read_text().splitlines()[6:]], float)
+    places = np.array([line.split(",")[:3] for line in measure.read_text().splitlines()[7:]], float)
     return np.argmin(((places[:, None] - home.point[None]) ** 2).sum(axis=2), axis=1)
 
 
@@ -227,20 +230,25 @@ def _others(
 
 def _explained(home: Surface, alone: dict[str, float]) -> np.ndarray:
     """(K,) [m] what causes explain at all points of the surface."""
+    prediction = predicted(home)
+    return prediction.errors(np.array([alone.get(cause.name, 0.0) for cause in prediction.causes]))
+
+
+def predicted(surface: Surface) -> CausePrediction:
+    """Of all points of a surface, as the program that was compensated by the shipped robot file cuts them."""
     from .cutting import commands
 
-    job = home.program
+    job = surface.program
     task = job.ready.task
     base = task.base[job.motions.rows[:1]]
     rotation = base.rotation[0]
-    surface = (base.position + 1e-3 * home.point @ rotation.T, home.normal @ rotation.T)
-    sent = commands(home, home.folder / "compensated" / "part.src")
-    states = touched_points(task, job.spindle, (home.row, home.share), surface, sent)
+    touched = (base.position + 1e-3 * surface.point @ rotation.T, surface.normal @ rotation.T)
+    sent = commands(surface, surface.folder / "compensated" / "part.src")
+    states = touched_points(task, job.spindle, (surface.row, surface.share), touched, sent)
     causes = robot_causes(job.ready.model)
-    causes += force_causes(job.operations.which[home.row], job.operations.names, PriorKnowledge())
-    causes += tool_causes(states, job.tool[home.row], job.ball, False)
-    x = np.array([alone.get(cause.name, 0.0) for cause in causes])
-    return CausePrediction(states, job.ready.model, tuple(causes)).errors(x)
+    causes += force_causes(job.operations.which[surface.row], job.operations.names, PriorKnowledge())
+    causes += tool_causes(states, job.tool[surface.row], job.ball, False)
+    return CausePrediction(states, job.ready.model, tuple(causes))
 
 
 def _elsewhere(
