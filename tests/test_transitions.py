@@ -250,6 +250,15 @@ def test_a_cut_whose_path_gets_worse_is_told():
     assert compared(job, FREE) == {}
     ((row, told),) = compared(job, Limits(no_insert=True)).items()
     assert (row, told.code, told.line) == (1, "COR016", 11)
+    assert "force_ramp" not in told.help
+
+
+def test_a_cut_that_a_short_ramp_spoils_names_the_ramp():
+    """The correction turns round where the force steps, sooner than a motion may be long: none is better."""
+    job = add_force_ramps(stepped(tolerance=2e-5), 0.1e-3)
+    assert compared(job, FREE) == {}
+    ((_, told),) = compared(job, Limits(no_insert=True)).items()
+    assert (told.code, "force_ramp" in told.help) == ("COR016", True)
 
 
 def test_a_correction_below_what_counts_is_no_better():
