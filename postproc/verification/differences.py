@@ -14,6 +14,7 @@ from postproc.compensation.problem import CompensationProblem
 from postproc.toolpath import Kind, Toolpath
 from postproc.verification.pairing import SAME
 from postproc.verification.path_samples import PathSamples
+from postproc.verification.run_path import RunPath
 from postproc.verification.simulator import Simulation, Simulator
 
 SAME_TURN = 3e-5
@@ -155,8 +156,11 @@ def missing(simulator: Simulator, samples: PathSamples) -> list[Difference]:
 def _missing(simulator: Simulator, samples: PathSamples) -> Ints:
     """Rows of the original, on cuts, at whose end no motion of the program ends."""
     rows, _, away, apart = _nearest_ends(simulator, samples)
+    # a vertex that is passed beside its point is not a place of the path: its points are where the rounded path wants
+    passed = np.append(simulator.path.reach, 0.0)[rows + 1]
+    near = np.maximum(passed, max(NEAR, simulator.original.tolerance))
     # nearer than to its neighbours; a motion that only turns the tool ends where another one does
-    limit = np.minimum(max(NEAR, simulator.original.tolerance), 0.45 * apart)
+    limit = np.minimum(near, 0.45 * apart)
     return rows[away > np.where(apart > NEAR * 1e-3, limit, NEAR)]
 
 
@@ -301,7 +305,10 @@ def _other_external(
     start, end, here = one[np.maximum(row - 1, 0)], one[row], two[motions.row]
     start = np.where(np.isfinite(start), start, end)
     rate = np.abs(end - start) / np.maximum(simulator.original.desired_path.length[row], NEAR)[:, None]
-    apart = np.abs(here - start - share * (end - start)) > SAME_EXTERNAL + rate * simulator.original.tolerance
+    # where the run passes beside the point that it states, so do the axes beside theirs
+    passed = np.append(RunPath.of(run).reach, 0.0)[motions.row + 1]
+    near = np.maximum(passed, simulator.original.tolerance)[:, None]
+    apart = np.abs(here - start - share * (end - start)) > SAME_EXTERNAL + rate * near
     apart |= np.isfinite(here) != np.isfinite(end)
     return [Difference(int(at), True, _EXTERNAL[0]) for at in motions.row[apart.any(axis=1)]]
 
