@@ -15,6 +15,7 @@ from postproc.base.batches import in_blocks
 from postproc.base.findings import Finding
 from postproc.base.geometry import lengths
 from postproc.base.units import MM
+from postproc.compensation.approximations import approximations
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.path_error import PathSegments, path_errors, programmed
 from postproc.compensation.problem import CompensationProblem
@@ -214,7 +215,7 @@ def evaluate_transitions(
         int(task.toolpath.line[row]),
         max(speeds, default=np.nan),
         sum(backwards for *_, backwards in parts),
-        int(_stops(result, division).sum()),
+        int(_stops(task, result, division).sum()),
         len(division.lead_ins),
     )
 
@@ -237,9 +238,13 @@ def _rates_on_ramps(task: CompensationProblem, segments: PathSegments) -> Floats
     return np.asarray(np.nan_to_num(change / extent))
 
 
-def _stops(result: CorrectionResult, division: Subdivision) -> Bools:
-    """(M,) inserted motions that stop inside of a cut: transition moves after a motion of the same cut."""
+def _stops(task: CompensationProblem, result: CorrectionResult, division: Subdivision) -> Bools:
+    """(M,) inserted motions that stop inside of a cut: transition moves after a motion of the same cut, and points that
+    the program's mode (G61), or an approximation of 0, passes exactly."""
     source = division.source
     before = np.maximum(source - 1, 0)
     inside = (source > 0) & (result.cut[before] == result.cut[source]) & (result.cut[source] >= 0)
-    return np.asarray((division.role == Role.TRANSITION) & inside)
+    stops = (division.role == Role.TRANSITION) & inside
+    inner = np.flatnonzero((division.role == Role.INTERMEDIATE) & task.carries[source])
+    stops[inner] = approximations(task, division, inner) == 0.0
+    return np.asarray(stops)

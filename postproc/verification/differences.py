@@ -137,10 +137,14 @@ def on_cuts(simulator: Simulator, run: CompensationProblem, simulation: Simulati
 def _new_stops(
     simulator: Simulator, run: CompensationProblem, samples: PathSamples, motions: ComparedMotions
 ) -> list[Difference]:
-    """Motions that stop where those of the original flow: anywhere but at the end of one that stops as well."""
+    """Motions that stop where those of the original flow: anywhere but at the end of one that stops as well, or on one
+    whose mode (G61) passes all points exactly."""
+    original = simulator.original.toolpath
     inside = np.append(motions.stretch[1:] == motions.stretch[:-1], False)[: len(motions.row)]
+    if original.constraints.exact_stays:
+        inside &= ~stops(original)[samples.place.row[motions.end]]
     rests = motions.row[stops(run.toolpath)[motions.row] & inside]
-    may = end_rows(simulator, samples)[stops(simulator.original.toolpath)]
+    may = end_rows(simulator, samples)[stops(original)]
     return [
         Difference(int(row), True, "the motion stops where the original flows")
         for row in np.setdiff1d(rests, may)
