@@ -2,6 +2,7 @@
 
 import pytest
 from judge.cases import CASES, FIVE_AXIS, gcode
+from judge.drawn import drawn
 from judge.further_cases import FURTHER
 from planted_faults import SAMPLES, Written
 
@@ -105,3 +106,17 @@ def test_points_that_the_mode_of_the_program_stops_at_are_counted(tmp_path):
     done = verify(Request(program, force=""), tmp_path / "compensated" / program.name)
     assert done.exit == 0
     assert done.compensated.stops == done.original.stops + report.inserted
+
+
+@pytest.mark.slow
+def test_an_original_that_has_no_figure_is_no_fault_of_what_was_written(tmp_path):
+    """Its deflected tool jumps over a corner; the corrected one does not."""
+    program = drawn(916).build(tmp_path)
+    assert compensate(Request(program, force="")).exit == 0
+    done = verify(Request(program, force=""), tmp_path / "compensated" / program.name)
+    assert (done.original.converged, done.compensated.converged) == (False, True)
+    assert {one.code for one in done.findings if one.code.startswith("VER")} == {"VER008"}
+    assert done.exit == 0
+    again = verify(Request(program, force=""), program)
+    assert "VER007" in {one.code for one in again.findings}
+    assert again.exit == 3
