@@ -138,7 +138,8 @@ def test_a_fitted_corner_changes_its_correction_as_fast_as_its_force_asks() -> N
     result = correct(job)
     plain = subdivide(job, result, FREE)
     fitted, division = fit_corners(job, result, plain, FREE)
-    assert division.fits is not None and len(division.fits.point)
+    assert division.fits is not None
+    assert len(division.fits.point)
     ramp = np.linspace(0.0, 0.05, 201)  # 5 mm of 100
     rows, wanted = np.full(201, 3), job.desired_path.at(np.full(201, 3), ramp)
     goal = job.goal(rows, wanted, ramp)

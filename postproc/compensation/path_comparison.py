@@ -226,9 +226,7 @@ def _rates_on_ramps(task: CompensationProblem, segments: PathSegments) -> Floats
     count = len(segments)
     rows = np.repeat(segments.rows, PARTS + 1)
     part = np.tile(np.linspace(0.0, 1.0, PARTS + 1), count)
-    share = np.repeat(segments.first, PARTS + 1) + part * np.repeat(
-        segments.last - segments.first, PARTS + 1
-    )
+    share = np.repeat(segments.first, PARTS + 1) + part * np.repeat(segments.last - segments.first, PARTS + 1)
     wanted = task.desired_path.at(rows, share)
     goal = task.goal(rows, wanted, share)
     done = task.command(rows, wanted, task.force.along(rows, share), goal, share=share)

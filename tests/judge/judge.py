@@ -284,8 +284,8 @@ def _between(one: np.ndarray, two: np.ndarray) -> np.ndarray:
 
 
 def _missed(wanted: Path, cut: tuple, place: np.ndarray, there: np.ndarray) -> float:
-    """[m] the largest distance of a place of the cut's path from the line of the tool's places: of those beside where it
-    is passed, and of the nearest one, if it is no farther along the path than ``PASSED``."""
+    """[m] the largest distance of a place of the cut's path from the line of the tool's places: of those beside where
+    it is passed, and of the nearest one, if it is no farther along the path than ``PASSED``."""
     ends = wanted.start[cut[0]], wanted.start[cut[1] + 1]
     label = np.unique(np.concatenate([_samples(wanted, *cut, STEP), np.asarray(ends)]))
     points = wanted.points(label, *cut)
