@@ -160,8 +160,10 @@ def missing(simulator: Simulator, samples: PathSamples) -> list[Difference]:
 def _missing(simulator: Simulator, samples: PathSamples) -> Ints:
     """Rows of the original, on cuts, at whose end no motion of the program ends."""
     rows, _, away, apart = _nearest_ends(simulator, samples)
-    # a vertex that is passed beside its point is not a place of the path: its points are where the rounded path wants
-    passed = np.append(simulator.path.reach, 0.0)[rows + 1]
+    # where the force steps at a vertex that is rounded, its points are where the rounded path wants them
+    ramps = simulator.original.force.ramps
+    stepped = np.isin(rows + 1, ramps.steps()[0]) if ramps is not None else np.zeros(len(rows), bool)
+    passed = np.where(stepped, np.append(simulator.path.reach, 0.0)[rows + 1], 0.0)
     near = np.maximum(passed, max(NEAR, simulator.original.tolerance))
     # nearer than to its neighbours; a motion that only turns the tool ends where another one does
     limit = np.minimum(near, 0.45 * apart)
