@@ -132,6 +132,25 @@ def test_a_fitted_corner_follows_the_original(distance: float) -> None:
     assert (steps > 0).all()
 
 
+def test_a_fitted_corner_changes_its_correction_as_fast_as_its_force_asks() -> None:
+    """Fitted points lie beside the path that the tool goes: their distances say nothing of it."""
+    job = square(0.5e-3)
+    result = correct(job)
+    plain = subdivide(job, result, FREE)
+    fitted, division = fit_corners(job, result, plain, FREE)
+    assert division.fits is not None
+    assert len(division.fits.point)
+    ramp = np.linspace(0.0, 0.05, 201)  # 5 mm of 100
+    rows, wanted = np.full(201, 3), job.desired_path.at(np.full(201, 3), ramp)
+    goal = job.goal(rows, wanted, ramp)
+    command = job.command(rows, wanted, job.force.along(rows, ramp), goal, share=ramp).command.position
+    steps = np.linalg.norm(np.diff(command - wanted.position, axis=0), axis=1)
+    fastest = steps.max() / (5e-3 / 200)
+    assert fastest > 0.1
+    moves = evaluate_transitions(job, fitted, division)
+    assert moves.rate == pytest.approx(fastest, rel=0.02)
+
+
 def test_straight_on_where_the_force_steps_there_is_a_corner() -> None:
     """The program does not turn; its correction does."""
     job = two_sides(0.5e-3, 0.0, 1.5 * ALONG)

@@ -250,6 +250,17 @@ def test_a_cut_whose_path_gets_worse_is_told():
     assert compared(job, FREE) == {}
     ((row, told),) = compared(job, Limits(no_insert=True)).items()
     assert (row, told.code, told.line) == (1, "COR016", 11)
+    assert "force_ramp" not in told.help
+
+
+def test_a_cut_that_a_short_ramp_spoils_names_the_ramp():
+    """The correction turns round where the force steps, sooner than a motion may be long: none is better."""
+    points = [[1.6, 0.1 * k, 0.5] for k in range(6)]
+    wrench = np.array([[(-1.0) ** k * 400, 0, 0, 0, 0, 0] for k in range(6)])
+    job = task(points, [False, *[True] * 5], wrench=wrench, kind=[Kind.PTP, *[Kind.LIN] * 5])
+    job = replace(job, force=replace(job.force, steps=np.array([False, False, *[True] * 4])))
+    ((_, told),) = compared(add_force_ramps(job, 0.1e-3), Limits(no_insert=True)).items()
+    assert (told.code, "force_ramp" in told.help) == ("COR016", True)
 
 
 def test_a_correction_below_what_counts_is_no_better():

@@ -1,7 +1,14 @@
 """Faults planted in written programs: ``verify`` rejects every one of them (see ``planted_faults``)."""
 
 import pytest
+from judge.cases import CASES, FIVE_AXIS, gcode
+from judge.drawn import drawn
+from judge.further_cases import FURTHER
 from planted_faults import SAMPLES, Written
+
+from postproc.workflows.preparation import Request
+from postproc.workflows.program import compensate
+from postproc.workflows.verify import verify
 
 FAULTS = [
     pytest.param(sample, plant, id=f"{sample}: {name}")
@@ -43,3 +50,73 @@ def test_there_are_fifty_of_them_and_some_in_every_language():
     assert len(FAULTS) >= 50
     assert {dialect.split(",")[0] for _, _, dialect in SAMPLES.values()} == {"KRL", "G-code", "RAPID", "TP"}
     assert min(len(faults) for faults, _, _ in SAMPLES.values()) >= 8
+
+
+CORNERS = {c.name: c for c in [*CASES, *FURTHER]}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "corners, C_DIS 0.5",
+        pytest.param("corners, C_DIS 2", marks=pytest.mark.slow),
+        pytest.param("entered from above, C_DIS 3", marks=pytest.mark.slow),
+        "positioner, 0 to 25",
+    ],
+)
+def test_points_of_rounded_corners_lie_beside_those_of_the_original(name, tmp_path):
+    """Where the correction turns at an approximated vertex no motion of what was written ends at it."""
+    program = CORNERS[name].build(tmp_path)
+    assert compensate(Request(program, force="")).exit == 0
+    done = verify(Request(program, force=""), tmp_path / "compensated" / program.name)
+    assert [one for one in done.findings if one.severity != "info"] == []
+    assert done.exit == 0
+
+
+def test_a_vertex_that_is_left_out_is_rejected(tmp_path):
+    program = CORNERS["corners, C_DIS 0.5"].build(tmp_path)
+    compensate(Request(program, force=""))
+    output = tmp_path / "compensated" / program.name
+    lines = output.read_text().splitlines(keepends=True)
+    cut = [i for i, text in enumerate(lines) if "C_DIS" in text and text.startswith("LIN")]
+    output.write_text("".join(text for i, text in enumerate(lines) if i not in cut[:2]))
+    assert verify(Request(program, force=""), output).exit == 3
+
+
+def test_an_orientation_that_cannot_be_stated_is_judged_where_it_is_kept(tmp_path):
+    """Under constant orientation control, as the report does (COR019)."""
+    program = CORNERS["CIRC #CONSTANT #BASE"].build(tmp_path)
+    assert compensate(Request(program, force="")).exit == 3
+    done = verify(Request(program, force=""), tmp_path / "compensated" / program.name)
+    assert done.exit == 3
+    assert any("off its orientation" in one.message for one in done.findings)
+
+
+G61 = [
+    "G21 G90 G17 G54", "T1 M6", "G61", "G0 X0. Y0. Z50.", "G1 Z0. F600", "(FORCE -150 260 -60 @FEED)",
+    "G1 X150. F1800", "G1 Y100.", "(FORCE OFF)", "G1 Z50. F3000",
+]  # fmt: skip
+
+
+def test_points_that_the_mode_of_the_program_stops_at_are_counted(tmp_path):
+    program = gcode(*G61, cell=FIVE_AXIS.replace("fanuc", "linuxcnc"))(tmp_path)
+    report = compensate(Request(program, force=""))
+    assert report.inserted > 0
+    assert report.path.transitions.stops == report.inserted
+    done = verify(Request(program, force=""), tmp_path / "compensated" / program.name)
+    assert done.exit == 0
+    assert done.compensated.stops == done.original.stops + report.inserted
+
+
+@pytest.mark.slow
+def test_an_original_that_has_no_figure_is_no_fault_of_what_was_written(tmp_path):
+    """Its deflected tool jumps over a corner; the corrected one does not."""
+    program = drawn(916).build(tmp_path)
+    assert compensate(Request(program, force="")).exit == 0
+    done = verify(Request(program, force=""), tmp_path / "compensated" / program.name)
+    assert (done.original.converged, done.compensated.converged) == (False, True)
+    assert {one.code for one in done.findings if one.code.startswith("VER")} == {"VER008"}
+    assert done.exit == 0
+    again = verify(Request(program, force=""), program)
+    assert "VER007" in {one.code for one in again.findings}
+    assert again.exit == 3

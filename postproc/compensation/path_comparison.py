@@ -15,8 +15,9 @@ from postproc.base.batches import in_blocks
 from postproc.base.findings import Finding
 from postproc.base.geometry import lengths
 from postproc.base.units import MM
+from postproc.compensation.approximations import approximations
 from postproc.compensation.correct import CorrectionResult
-from postproc.compensation.path_error import path_errors, programmed
+from postproc.compensation.path_error import PathSegments, path_errors, programmed
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.subdivision import Subdivision, subdivided_motions
 from postproc.toolpath import Role
@@ -26,6 +27,12 @@ WORTH = 1e-9
 
 ROUNDING = 1e-6
 """[m] What the digits of a program do to a path."""
+
+HELP = "allow inserted motions (no --no-insert), raise max_growth, or loosen the tolerance"
+LONGER_RAMP = "the force steps inside this cut: state a longer force_ramp if it changes more slowly"
+
+PARTS = 8
+"""Parts of a motion between which the correction on a ramp of the force is compared."""
 
 
 def across_feed(task: CompensationProblem, rows: Ints, error: Floats) -> tuple[Floats, Floats]:
@@ -94,6 +101,9 @@ def cuts_not_improved(
         )
     ends_not_better = (square[0] > square[1] - WORTH**2) & ~(profiled & (after < first - ROUNDING))
     worse = (after > first + ROUNDING) | ends_not_better | turned
+    stepped = np.zeros(len(cuts), bool)
+    if task.force.ramps is not None:
+        stepped[place[np.isin(rows, task.force.ramps.steps()[0])]] = True
     findings = {}
     for k in np.flatnonzero(worse).tolist():
         row = int(rows[np.argmax(place == k)])
@@ -109,7 +119,7 @@ def cuts_not_improved(
             what,
             task.file,
             line,
-            help="allow inserted motions (no --no-insert), raise max_growth, or loosen the tolerance",
+            help=HELP + (f"; {LONGER_RAMP}" if stepped[k] else ""),
         )
     return findings
 
@@ -160,11 +170,14 @@ def evaluate_transitions(
     source, desired_path = division.source, task.desired_path
     chosen = np.flatnonzero(result.corrected[source] & desired_path.traceable[source] & ~division.transitions)
 
-    rounded = np.zeros(
-        len(division), bool
-    )  # there the correction is one of the rounded path, and not of its points
+    # there the correction is one of the rounded path, and not of its points
+    rounded = np.zeros(len(division), bool)
     if division.fits is not None:
         rounded[division.fits.point] = rounded[division.fits.point + 1] = True
+    ramps = task.force.ramps
+    on_ramp = np.zeros(len(task.carries), bool)
+    if ramps is not None:
+        on_ramp[ramps.row] = True
 
     def compare(part: slice) -> tuple[float, int, float, int]:
         segments = subdivided_motions(task, division, chosen[part])
@@ -178,6 +191,9 @@ def evaluate_transitions(
         moves = extent > 0
         even = moves & ~rounded[chosen[part]]
         rate = np.where(even, change / np.where(moves, extent, 1.0), 0.0)
+        ramp = np.flatnonzero(moves & ~even & on_ramp[segments.rows])
+        if len(ramp):
+            rate[ramp] = _rates_on_ramps(task, segments[ramp])
         speed = rate * task.toolpath.feed[segments.rows]
         ahead = np.sum((segments.end.position - segments.start.position) * (last - first), axis=1)
         worst = int(np.argmax(rate))
@@ -199,14 +215,34 @@ def evaluate_transitions(
         int(task.toolpath.line[row]),
         max(speeds, default=np.nan),
         sum(backwards for *_, backwards in parts),
-        int(_stops(result, division).sum()),
+        int(_stops(task, result, division).sum()),
         len(division.lead_ins),
     )
 
 
-def _stops(result: CorrectionResult, division: Subdivision) -> Bools:
-    """(M,) inserted motions that stop inside of a cut: transition moves after a motion of the same cut."""
+def _rates_on_ramps(task: CompensationProblem, segments: PathSegments) -> Floats:
+    """(S,) [m per m] the largest change of the correction that the paths of S segments need, by the path itself: their
+    rounded points lie beside it."""
+    count = len(segments)
+    rows = np.repeat(segments.rows, PARTS + 1)
+    part = np.tile(np.linspace(0.0, 1.0, PARTS + 1), count)
+    share = np.repeat(segments.first, PARTS + 1) + part * np.repeat(segments.last - segments.first, PARTS + 1)
+    wanted = task.desired_path.at(rows, share)
+    goal = task.goal(rows, wanted, share)
+    done = task.command(rows, wanted, task.force.along(rows, share), goal, share=share)
+    shift = done.command.position - wanted.position
+    change = np.linalg.norm(np.diff(shift.reshape(count, PARTS + 1, 3), axis=1), axis=2).max(axis=1)
+    extent = (segments.last - segments.first) * task.desired_path.length[segments.rows] / PARTS
+    return np.asarray(np.nan_to_num(change / extent))
+
+
+def _stops(task: CompensationProblem, result: CorrectionResult, division: Subdivision) -> Bools:
+    """(M,) inserted motions that stop inside of a cut: transition moves after a motion of the same cut, and points that
+    the program's mode (G61), or an approximation of 0, passes exactly."""
     source = division.source
     before = np.maximum(source - 1, 0)
     inside = (source > 0) & (result.cut[before] == result.cut[source]) & (result.cut[source] >= 0)
-    return np.asarray((division.role == Role.TRANSITION) & inside)
+    stops = (division.role == Role.TRANSITION) & inside
+    inner = np.flatnonzero((division.role == Role.INTERMEDIATE) & task.carries[source])
+    stops[inner] = approximations(task, division, inner) == 0.0
+    return np.asarray(stops)

@@ -14,6 +14,7 @@ from postproc.compensation.problem import CompensationProblem
 from postproc.toolpath import Kind, Toolpath
 from postproc.verification.pairing import SAME
 from postproc.verification.path_samples import PathSamples
+from postproc.verification.run_path import RunPath
 from postproc.verification.simulator import Simulation, Simulator
 
 SAME_TURN = 3e-5
@@ -136,10 +137,14 @@ def on_cuts(simulator: Simulator, run: CompensationProblem, simulation: Simulati
 def _new_stops(
     simulator: Simulator, run: CompensationProblem, samples: PathSamples, motions: ComparedMotions
 ) -> list[Difference]:
-    """Motions that stop where those of the original flow: anywhere but at the end of one that stops as well."""
+    """Motions that stop where those of the original flow: anywhere but at the end of one that stops as well, or on one
+    whose mode (G61) passes all points exactly."""
+    original = simulator.original.toolpath
     inside = np.append(motions.stretch[1:] == motions.stretch[:-1], False)[: len(motions.row)]
+    if original.constraints.exact_stays:
+        inside &= ~stops(original)[samples.place.row[motions.end]]
     rests = motions.row[stops(run.toolpath)[motions.row] & inside]
-    may = end_rows(simulator, samples)[stops(simulator.original.toolpath)]
+    may = end_rows(simulator, samples)[stops(original)]
     return [
         Difference(int(row), True, "the motion stops where the original flows")
         for row in np.setdiff1d(rests, may)
@@ -155,8 +160,13 @@ def missing(simulator: Simulator, samples: PathSamples) -> list[Difference]:
 def _missing(simulator: Simulator, samples: PathSamples) -> Ints:
     """Rows of the original, on cuts, at whose end no motion of the program ends."""
     rows, _, away, apart = _nearest_ends(simulator, samples)
+    # where the force steps at a vertex that is rounded, its points are where the rounded path wants them
+    ramps = simulator.original.force.ramps
+    stepped = np.isin(rows + 1, ramps.steps()[0]) if ramps is not None else np.zeros(len(rows), bool)
+    passed = np.where(stepped, np.append(simulator.path.reach, 0.0)[rows + 1], 0.0)
+    near = np.maximum(passed, max(NEAR, simulator.original.tolerance))
     # nearer than to its neighbours; a motion that only turns the tool ends where another one does
-    limit = np.minimum(max(NEAR, simulator.original.tolerance), 0.45 * apart)
+    limit = np.minimum(near, 0.45 * apart)
     return rows[away > np.where(apart > NEAR * 1e-3, limit, NEAR)]
 
 
@@ -301,7 +311,10 @@ def _other_external(
     start, end, here = one[np.maximum(row - 1, 0)], one[row], two[motions.row]
     start = np.where(np.isfinite(start), start, end)
     rate = np.abs(end - start) / np.maximum(simulator.original.desired_path.length[row], NEAR)[:, None]
-    apart = np.abs(here - start - share * (end - start)) > SAME_EXTERNAL + rate * simulator.original.tolerance
+    # where the run passes beside the point that it states, so do the axes beside theirs
+    passed = np.append(RunPath.of(run).reach, 0.0)[motions.row + 1]
+    near = np.maximum(passed, simulator.original.tolerance)[:, None]
+    apart = np.abs(here - start - share * (end - start)) > SAME_EXTERNAL + rate * near
     apart |= np.isfinite(here) != np.isfinite(end)
     return [Difference(int(at), True, _EXTERNAL[0]) for at in motions.row[apart.any(axis=1)]]
 

@@ -172,13 +172,15 @@ def _beside_leaps(placed: PlacedTool, stretch: Ints) -> Iterator[tuple[Ints, Flo
 
 def judged(original: CompensationProblem, rows: Ints, rotation: Floats, turn: Floats) -> Floats:
     """(K, 3) [rad]: ``turn`` (K, 3) of tools at ``rotation`` (K, 3, 3), without what the text of ``rows`` (K,) cannot
-    state: a turn about the tool's own axis where that is free, all of it where the orientation comes from outside."""
+    state: a turn about the tool's own axis where that is free, all of it where the orientation comes from outside.  A
+    motion that keeps the orientation before it has to keep the right one."""
     path = original.toolpath
     free = np.nan_to_num(path.orientation_control.redundant_axis[rows])
     if free.any():
         axis = (rotation @ free[..., None])[..., 0]
         turn = turn - np.sum(turn * axis, axis=1, keepdims=True) * axis
-    return np.where(path.constraints.orientation_programmed[rows][:, None], turn, 0.0)
+    stated = path.constraints.orientation_programmed[rows] | path.keeps_orientation[rows]
+    return np.where(stated[:, None], turn, 0.0)
 
 
 class _Solution:

@@ -281,6 +281,17 @@ CODES = define(
             action="Check force and model at this place.",
             example="A pose without an equilibrium.",
         ),
+        "VER008": Code(
+            "info",
+            "no error value of the original",
+            meaning=(
+                "Without a correction the force at a place and the place under that force do not converge: "
+                "the deflected tool has several places on the path, or none."
+            ),
+            consequence="No error before the correction is stated; that of the compensated program is.",
+            action="Nothing; a longer force_ramp, if the force changes more slowly, makes the places distinct.",
+            example="A corner at which the force turns, and the tool is deflected by more than its ramp.",
+        ),
         "FIL012": Code(
             "error",
             "program of two files in a stream",

@@ -189,7 +189,8 @@ def _figures(
             [samples.motion[~samples.place.settled], simulation.points[np.isnan(simulation.point_error)]]
         )
         message = "force and place on the path do not converge, or the robot cannot reach the place"
-        findings.append(_first("VER007", f"{message}; no error is computed", file, line[np.unique(lost)]))
+        code, what = ("VER007", "no error") if judged else ("VER008", "no error before the correction")
+        findings.append(_first(code, f"{message}; {what} is computed", file, line[np.unique(lost)]))
     elif judged:
         findings += _above(ready, run, simulation, file)
     if judged and simulation.skipped:

@@ -92,11 +92,17 @@ def run(case: Case, folder: Path, verify: bool = False, rule: str = RULE, packag
     told = _command("verify", program, output, "--force", "--json", "-", package=package)
     if told.stdout.lstrip().startswith("{"):
         said = json.loads(told.stdout)
+        if case.wanted == "within" and done.returncode == 0 and said["exit"]:
+            outcome.failed.append("verify rejects it: " + ", ".join(_codes(said)))
         found = [said.get(which) or {} for which in ("compensated", "original")]
         outcome.verify, outcome.verify_before = (
             None if one.get("max") is None else max(one["max"], one.get("missed") or 0.0) for one in found
         )
     return outcome
+
+
+def _codes(said: dict) -> list[str]:
+    return sorted({one["code"] for one in said["findings"] if one["severity"] != "info"})
 
 
 def _command(*words: object, package: Path = PACKAGE) -> subprocess.CompletedProcess[str]:

@@ -43,7 +43,7 @@ def defects(outcome: Outcome) -> list[str]:
         word for word in wrong if not word.endswith("stops")
     ]  # what is inserted under G61 stops, and is told
     if outcome.verify is None:  # where force and place do not converge it gives no figure, and says so
-        return wrong
+        return [word for word in wrong if word != "verify rejects it: VER007"]
     off = abs(outcome.verify - 1e3 * outcome.verdict.after.largest)
     return wrong + ([f"verify is {off:.4f} mm off"] if off > SEEN else [])
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path as File
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from .cell import Cell
 from .force import RULE, STRETCHED, Field
@@ -28,6 +29,9 @@ WORST, PARTS, ROUNDS = 6, 16, 2
 """Places with the largest errors beside which is sampled again, in so many parts of the way to the next samples, and
 how often."""
 BACKWARDS = 2e-6
+PASSED = 8.0 * MM
+"""[m] How far along the path a place may be passed beside where the tool belongs to it: where a tool leaps over a
+corner, it came near to that before."""
 CORRECTIONS = 8
 """Rounds in which a target is corrected: each leaves less than a hundredth of what was off."""
 MATCH = 1e-9
@@ -280,14 +284,17 @@ def _between(one: np.ndarray, two: np.ndarray) -> np.ndarray:
 
 
 def _missed(wanted: Path, cut: tuple, place: np.ndarray, there: np.ndarray) -> float:
-    """[m] the largest distance of a place of the cut's path from the line of the tool's places."""
+    """[m] the largest distance of a place of the cut's path from the line of the tool's places: of those beside where
+    it is passed, and of the nearest one, if it is no farther along the path than ``PASSED``."""
     ends = wanted.start[cut[0]], wanted.start[cut[1] + 1]
     label = np.unique(np.concatenate([_samples(wanted, *cut, STEP), np.asarray(ends)]))
     points = wanted.points(label, *cut)
     near = np.searchsorted(np.maximum.accumulate(place), label)
+    nearest = cKDTree(there).query(points)[1]
+    nearest = np.where(np.abs(place[nearest] - label) < PASSED, nearest, near)
     best = np.full(len(label), np.inf)
-    for shift in range(-6, 6):
-        k = np.clip(near + shift, 0, len(there) - 2)
+    for k in [near + shift for shift in range(-6, 6)] + [nearest - 1, nearest]:
+        k = np.clip(k, 0, len(there) - 2)
         start, way = there[k], there[k + 1] - there[k]
         share = np.clip(((points - start) * way).sum(1) / np.maximum((way**2).sum(1), 1e-18), 0, 1)
         best = np.minimum(best, np.linalg.norm(points - start - share[:, None] * way, axis=1))

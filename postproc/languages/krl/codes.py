@@ -263,7 +263,10 @@ CODES = define(
             consequence=(
                 "The orientation of the tool between the points is unknown, so the motion is not corrected."
             ),
-            action="Set $ORI_TYPE=#VAR and $CIRC_TYPE=#BASE for this cut.",
+            action=(
+                "Set $ORI_TYPE=#VAR for this cut and state the orientations of its targets; with $CIRC_TYPE=#PATH the "
+                "tool still turns with the arc."
+            ),
             example="`$ORI_TYPE = #JOINT` before a LIN that rotates the tool.",
         ),
         "KRL033": Code(
