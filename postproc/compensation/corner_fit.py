@@ -23,6 +23,7 @@ from postproc.compensation.corner_points import PointChooser
 from postproc.compensation.corners import compare_corners_at, evaluate_corners, find_corners, suspect_corners
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.problem import CompensationProblem
+from postproc.compensation.ramp_fits import CloseFits
 from postproc.compensation.ramp_points import NEVER, LeastPoints, choose_ramp_points
 from postproc.compensation.rounded_path import Blend, Deviations, RoundedOutput
 from postproc.compensation.subdivision import Limits, Subdivision
@@ -66,13 +67,14 @@ def fit_corners(
     least = {} if least is None else least
     if task.gain != 1.0:
         return result, division
-    fit, plain, rows = _fit_all(task, result, division, limits, least, np.empty(0, np.int64))
+    close = CloseFits()
+    fit, plain, rows = _fit_all(task, result, division, limits, least, np.empty(0, np.int64), close)
     if not len(rows):
         return fit, plain
     # what no points hold: those that come nearest to the ramps, or those of the corners alone
     before = _near_ramps(task, plain, rows)
     for _ in range(2):
-        nearest, other, _ = _fit_all(task, result, division, limits, least, rows)
+        nearest, other, _ = _fit_all(task, result, division, limits, least, rows, close)
         better = _near_ramps(task, other, rows) < BETTER * before
         if better.all():
             return nearest, other
@@ -106,10 +108,11 @@ def _fit_all(
     limits: Limits,
     least: LeastPoints,
     anyhow: Ints,
+    close: CloseFits,
 ) -> tuple[CorrectionResult, Subdivision, Ints]:
     """The result and the division with fitted ramps and corners, and the rows (L,) of the ramps that are left, but for
     those ``anyhow`` (A,)."""
-    result, division, rows = _fit_ramps(task, result, division, limits, least, anyhow)
+    result, division, rows = _fit_ramps(task, result, division, limits, least, anyhow, close)
     return *_fit_alone(task, result, division, limits, least), rows
 
 
@@ -164,13 +167,14 @@ def _fit_ramps(
     limits: Limits,
     least: LeastPoints,
     anyhow: Ints,
+    close: CloseFits,
 ) -> tuple[CorrectionResult, Subdivision, Ints]:
     """The same with the points on ramps of the force, as few as hold the tolerance, and the rows (L,) of those left,
     but for ``anyhow`` (A,)."""
     least = dict(least)
     while True:
         part, chosen, left = choose_ramp_points(
-            task, result, division, limits, least, FITTED * task.tolerance, anyhow
+            task, result, division, limits, least, FITTED * task.tolerance, anyhow, close
         )
         if chosen is None:
             return result, division, left
