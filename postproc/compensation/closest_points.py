@@ -34,7 +34,7 @@ WIDER, NARROWER = 2.0, 0.35
 SOME, GAIN = 6, 0.995
 """So many steps in which no more than this share remains of the error, or the search ends."""
 
-LITTLE = 0.4
+LITTLE = 0.2
 """Errors below this share of the largest are left out of a step."""
 
 ANGLES = np.arange(8) * np.pi / 4

@@ -183,9 +183,9 @@ def _fit_ramps(
         enough = ON_RAMPS / ALLOWED
         stated = stated_alone(task)
         fitted, _ = _fitted(stated, fitted, enough)
-        after = _largest(stated, fitted)
         at_vertex = part.share[chosen.corner] == 1.0  # else where the ramp ends
         taken = np.isin(part.source[chosen.corner] + at_vertex, anyhow)
+        after = _largest(stated, fitted, taken)
         bad = ~(after <= enough) & ~taken
         if not bad.any():
             fits = fitted.division.fits
@@ -276,16 +276,20 @@ def _fitted(
     return fitted.moved(task, best), least
 
 
-def _largest(task: CompensationProblem, fitted: CornerDivision) -> Floats:
-    """(G,) the largest errors of the corners, looked for closely, in parts of the allowed one."""
+def _largest(task: CompensationProblem, fitted: CornerDivision, taken: Bools) -> Floats:
+    """(G,) the largest errors of the corners, looked for closely, in parts of the allowed one; those on motions beside
+    a corner that is ``taken`` (G,) anyhow are its own: no points of the next corner make them less."""
     largest = np.zeros(len(fitted.group_start) - 1)
+    points = fitted.motion[taken[fitted.group]]
+    beside = np.union1d(points, points + 1)
     for part in blocks(len(largest), BLOCK):
         first, last = fitted.group_start[part.start], fitted.group_start[part.stop]
         motions = fitted.motion[first:last]
         output = RoundedOutput(task, fitted.division, np.unique(np.concatenate([motions, motions + 1])))
         group, at, share = _samples(fitted, output, part).by_segment
-        size = _size(task, *output.peaks(at, share))
-        np.maximum.at(largest, group, size)
+        own = taken[group] | ~np.isin(output.motions[at[:, 0]], beside)
+        size = _size(task, *output.peaks(at[own], share[own]))
+        np.maximum.at(largest, group[own], size)
     return largest
 
 

@@ -1,4 +1,4 @@
-"""Points on ramps of the force, fitted from where they may start: few at first, and closely where few are not enough."""
+"""Points on ramps of the force, fitted from where they may start: few first, and closely where that is not enough."""
 
 from __future__ import annotations
 
@@ -89,9 +89,7 @@ CLOSE_STARTS: tuple[tuple[Words, float], ...] = (
     (_both(range(-1, 2), range(-1, 2)), 1.02),
     (_both(range(-1, 3), range(-1, 2)), 1.02),
     (_both(range(-1, 3), range(-2, 2)), 1.02),
-    (_both(range(-2, 3), range(-1, 3)), 1.02),
     (_both(range(-2, 3), range(-2, 3)), 1.02),
-    (_both(range(-2, 3), range(-2, 3)), 1.3),
 )
 """Where points start that are fitted closely, as near to each other as the shortest motion lets them, and by which
 factor lines are longer than that."""
@@ -175,7 +173,7 @@ def fit_ramps(
 def _polygons(
     ramps: FittedRamps, curves: Curves, start: Floats, place: int, exact: bool
 ) -> tuple[Floats, Floats, Floats, int]:
-    """Parameters [m], reaches [m] (G, n + 2) and shortest lines (G, n + 1) [m] of polygons from ``start`` (G, n) [m] on,
+    """Parameters [m], reaches [m] (G, n + 2), shortest lines (G, n + 1) [m] of polygons from ``start`` (G, n) [m] on,
     of which the point ``place`` is the vertex or, where that is exact, the end of the ramp; and which is the vertex."""
     first = curves.first if exact else curves.ends[:, 0]
     parameter = np.column_stack([first, start, curves.ends[:, 1]])

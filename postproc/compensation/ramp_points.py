@@ -105,14 +105,14 @@ def choose_ramp_points(
         for number, (words, _) in enumerate(CLOSE_STARTS):
             if not fewest[name] <= len(words) - 1 <= inner[name] + spare:
                 continue
-            one = close.fit(ramps[np.array([name])], curves[np.array([name])], number, allowed)
-            if one is None:
+            near = close.fit(ramps[np.array([name])], curves[np.array([name])], number, allowed)
+            if near is None:
                 continue
-            if one.largest <= allowed:
-                found[name] = one
+            if near.largest <= allowed:
+                found[name] = near
                 break
-            if name not in nearest or one.largest < PAYS_CLOSE * nearest[name].largest:
-                nearest[name] = one
+            if name not in nearest or near.largest < PAYS_CLOSE * nearest[name].largest:
+                nearest[name] = near
     wanted = np.isin(ramps.row, anyhow).tolist()
     found |= {name: one for name, one in nearest.items() if name not in found and wanted[name]}
     part, chosen = _without_points(task, division, ramps, found)
