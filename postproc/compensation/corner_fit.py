@@ -19,7 +19,7 @@ from postproc.base.geometry import Poses, lengths, product, rotation_from_vector
 from postproc.base.units import MM
 from postproc.compensation.approximations import approximations, as_stated, stated_alone
 from postproc.compensation.corner_division import CornerDivision, with_corners
-from postproc.compensation.corner_points import PointChooser
+from postproc.compensation.corner_points import ALONE, ChosenPoints, PointChooser
 from postproc.compensation.corners import compare_corners_at, evaluate_corners, find_corners, suspect_corners
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.problem import CompensationProblem
@@ -149,9 +149,19 @@ def _fit_alone(
     corners = corners.part(bad)
     free = np.full(len(task.toolpath), not limits.no_insert) & task.carries
     free[list(task.toolpath.constraints.no_insert_before)] = False
-    chosen = PointChooser(task, division, limits, free, corners, size[bad]).choose()
-    fitted = with_corners(task, result, division, chosen, np.ones(len(chosen.corner), bool))
-    fitted, after = _fitted(task, fitted)
+    chooser = PointChooser(task, division, limits, free, corners, size[bad])
+
+    def fit(points: ChosenPoints) -> tuple[ChosenPoints, CornerDivision, Floats]:
+        every = np.ones(len(points.corner), bool)
+        return points, *_fitted(task, with_corners(task, result, division, points, every))
+
+    chosen, fitted, after = fit(chooser.choose())
+    beyond = after > 1.0 / ALLOWED
+    if beyond.any():  # their own point took less away than was expected of it
+        more = fit(chooser.choose(np.where(beyond, after / ALONE, 0.0)))
+        still = more[2] > 1.0 / ALLOWED
+        if still.sum() < beyond.sum() and more[2].max() <= after.max():
+            chosen, fitted, after = more
     better = after < BETTER * chosen.before
     if not better.any():
         return result, division
