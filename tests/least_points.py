@@ -1,11 +1,12 @@
-"""``python -m tests.least_points [PROGRAM]``: how many points its ramps of the force need at least, whoever places them.
+"""``python -m tests.least_points [PROGRAM]``: how many points its ramps of the force need at least, wherever they are.
 
 Between its ends a motion without a point in between is a straight line, but for the parabolas at its ends.  On a ramp
-the wanted command turns where the force has gone over.  Of three places in a row, the middle one is off the line between
-the others by twice the tolerance or more: no straight line is within the tolerance of all three, so that the motion has
-a point at least.  With one point, rounded off from d on, the path beside it is a line, a parabola over 2 d, and a line;
-the best of these for every place of the point, by a linear programme over both lines, is further off than the
-tolerance: the motion has two points at least.  Points at vertices are taken to be no further than ``SHIFTED`` from them.
+the wanted command turns where the force has gone over.  Where, of three places in a row, the middle one is off the line
+between the others by more than twice the tolerance, no straight line is within the tolerance of all three, and the
+motion has a point at least.  With one point, rounded off from d on, the path beside it is a line, a parabola over 2 d,
+and a line; where the best of these for every place of the point, by a linear programme over both lines, is further off
+than the tolerance, the motion has two points at least.  Points at vertices are taken to be no further than ``SHIFTED``
+from them.
 """
 
 from __future__ import annotations

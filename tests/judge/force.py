@@ -45,14 +45,14 @@ class Field:
         path: Path,
         low: int,
         high: int,
-        ramp: Callable[[float], float],
+        ramp: float | Callable[[float], float],
         largest: float,
         rule: str = CENTRED,
         correct: Callable[[int, np.ndarray], np.ndarray] | None = None,
     ) -> None:
-        """``low``, ``high``: first and last motion; ramp: its length [m] by the feed [m/s] behind a vertex; largest
-        [N]: of the program; correct: by how much (3,) [m] a target is moved where a motion begins under a wrench (6,),
-        for the rule STRETCHED."""
+        """``low``, ``high``: first and last motion; ramp: its length [m], or that by the feed [m/s] behind a vertex;
+        largest [N]: of the program; correct: by how much (3,) [m] a target is moved where a motion begins under a
+        wrench (6,), for the rule STRETCHED."""
         self.path, self.low, self.high = path, low, high
         self.rows = np.arange(low, high + 1)
         motions = path.motions[low : high + 1]
@@ -67,7 +67,7 @@ class Field:
         self.begin, self.end = begin, end
         # ramps at the vertices that are left: their half, and the wrench in their middle
         step = np.flatnonzero(~smooth)
-        reaches = np.array([ramp(m.feed) for m in motions])
+        reaches = np.array([ramp(m.feed) if callable(ramp) else ramp for m in motions])
         self.after: list[tuple[float, float, np.ndarray]] = []
         if rule != CENTRED:
             for k in step:
