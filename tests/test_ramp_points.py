@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from judge.cases import lead_in
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 from test_corner_fit import ALONG, FREE, square, two_sides
@@ -15,10 +17,12 @@ from postproc.compensation.corner_fit import fit_corners
 from postproc.compensation.corners import rounded_errors
 from postproc.compensation.correct import correct
 from postproc.compensation.point_fit import Curves, fit_points
-from postproc.compensation.ramp_points import NEVER
+from postproc.compensation.ramp_points import NEVER, choose_ramp_points
 from postproc.compensation.rounded_path import RoundedOutput
 from postproc.compensation.subdivide import subdivide
+from postproc.compensation.subdivision import Limits
 from postproc.toolpath import Role
+from postproc.workflows.preparation import Request, prepare
 
 MM = 1e-3
 END = 8.0 * MM
@@ -261,3 +265,23 @@ def test_no_point_moves_beyond_its_neighbours() -> None:
     at = division.source + division.share
     assert (np.diff(at) > 0).all()
     assert (division.share[division.role == Role.INTERMEDIATE] > 0).all()
+
+
+@pytest.mark.slow
+def test_what_a_ramp_keeps_is_not_asked_of_the_next(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Points of the next ramp cannot take it away: fitted again and again, they became five where one is enough."""
+    program = lead_in(10, 0)(tmp_path)
+    with (tmp_path / "cell.yaml").open("a") as cell:
+        cell.write("force_ramp: 5\n")
+    task = prepare(Request(program, force="")).task
+    result = correct(task)
+    limits = Limits(cycle=0.012, ramp_end=0.3e-3, least=200)
+    calls = []
+
+    def counted(*words: object) -> object:
+        calls.append(words[4])
+        return choose_ramp_points(*words)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("postproc.compensation.corner_fit.choose_ramp_points", counted)
+    fit_corners(task, result, subdivide(task, result, limits), limits)
+    assert len(calls) <= 4

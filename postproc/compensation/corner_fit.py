@@ -286,18 +286,18 @@ def _fitted(
     return fitted.moved(task, best), least
 
 
-def _largest(task: CompensationProblem, fitted: CornerDivision, taken: Bools) -> Floats:
+def _largest(task: CompensationProblem, fitted: CornerDivision, accepted: Bools) -> Floats:
     """(G,) the largest errors of the corners, looked for closely, in parts of the allowed one; those on motions beside
-    a corner that is ``taken`` (G,) anyhow are its own: no points of the next corner make them less."""
+    a corner that is ``accepted`` (G,) anyhow are its own: no points of the next corner make them less."""
     largest = np.zeros(len(fitted.group_start) - 1)
-    points = fitted.motion[taken[fitted.group]]
+    points = fitted.motion[accepted[fitted.group]]
     beside = np.union1d(points, points + 1)
     for part in blocks(len(largest), BLOCK):
         first, last = fitted.group_start[part.start], fitted.group_start[part.stop]
         motions = fitted.motion[first:last]
         output = RoundedOutput(task, fitted.division, np.unique(np.concatenate([motions, motions + 1])))
         group, at, share = _samples(fitted, output, part).by_segment
-        own = taken[group] | ~np.isin(output.motions[at[:, 0]], beside)
+        own = accepted[group] | ~np.isin(output.motions[at[:, 0]], beside)
         size = _size(task, *output.peaks(at[own], share[own]))
         np.maximum.at(largest, group[own], size)
     return largest

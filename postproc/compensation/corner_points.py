@@ -64,10 +64,10 @@ class PointChooser:
         # of each segment, what the corners at its start and at its end take of its length [m]
         self.taken = np.zeros((2, len(self.output.motions)))
 
-    def choose(self, seen: Floats | float = 0.0) -> ChosenPoints:
-        """Points of all corners, the worst first, as many as may be inserted; where ``seen`` (K,) is more than the
+    def choose(self, remaining: Floats | float = 0.0) -> ChosenPoints:
+        """Points of all corners, the worst first, as many as may be inserted; where ``remaining`` (K,) is more than the
         error before, by that, and outside of what the program rounds off where that is shorter than a motion."""
-        errors = np.maximum(self.before, seen)
+        errors = np.maximum(self.before, remaining)
         self.taken[1], self.taken[0, 1:] = 2.0 * self.output.reach, 2.0 * self.output.reach[:-1]
         spare = self.limits.inserted(len(self.task.toolpath)) - self.division.inserted
         places = self.output.place(self.corners.motion)
