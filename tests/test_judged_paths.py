@@ -269,7 +269,7 @@ def test_the_written_path(case: Case, tmp_path: Path) -> None:
 def test_verify_agrees_where_the_tool_may_be_at_two_places(tmp_path: Path) -> None:
     """The correction turns back at the corner, so that the path is square to the tool before and after it: the nearer
     of both counts, over all of the stretch on which there are two."""
-    outcome = run(Case("corners against the force", against_the_force(0.02)), tmp_path, verify=True)
+    outcome = run(Case("corners against the force", against_the_force(0.01)), tmp_path, verify=True)
     assert outcome.exit == 3
     assert outcome.verdict is not None
     assert outcome.verify == pytest.approx(outcome.verdict.after.largest / MM, abs=1e-3)
