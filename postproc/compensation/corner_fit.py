@@ -19,10 +19,11 @@ from postproc.base.geometry import Poses, lengths, product, rotation_from_vector
 from postproc.base.units import MM
 from postproc.compensation.approximations import approximations, as_stated, stated_alone
 from postproc.compensation.corner_division import CornerDivision, with_corners
-from postproc.compensation.corner_points import PointChooser
+from postproc.compensation.corner_points import ALONE, ChosenPoints, PointChooser
 from postproc.compensation.corners import compare_corners_at, evaluate_corners, find_corners, suspect_corners
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.problem import CompensationProblem
+from postproc.compensation.ramp_fits import CloseFits
 from postproc.compensation.ramp_points import NEVER, LeastPoints, choose_ramp_points
 from postproc.compensation.rounded_path import Blend, Deviations, RoundedOutput
 from postproc.compensation.subdivision import Limits, Subdivision
@@ -66,13 +67,14 @@ def fit_corners(
     least = {} if least is None else least
     if task.gain != 1.0:
         return result, division
-    fit, plain, rows = _fit_all(task, result, division, limits, least, np.empty(0, np.int64))
+    close = CloseFits()
+    fit, plain, rows = _fit_all(task, result, division, limits, least, np.empty(0, np.int64), close)
     if not len(rows):
         return fit, plain
     # what no points hold: those that come nearest to the ramps, or those of the corners alone
     before = _near_ramps(task, plain, rows)
     for _ in range(2):
-        nearest, other, _ = _fit_all(task, result, division, limits, least, rows)
+        nearest, other, _ = _fit_all(task, result, division, limits, least, rows, close)
         better = _near_ramps(task, other, rows) < BETTER * before
         if better.all():
             return nearest, other
@@ -106,10 +108,11 @@ def _fit_all(
     limits: Limits,
     least: LeastPoints,
     anyhow: Ints,
+    close: CloseFits,
 ) -> tuple[CorrectionResult, Subdivision, Ints]:
     """The result and the division with fitted ramps and corners, and the rows (L,) of the ramps that are left, but for
     those ``anyhow`` (A,)."""
-    result, division, rows = _fit_ramps(task, result, division, limits, least, anyhow)
+    result, division, rows = _fit_ramps(task, result, division, limits, least, anyhow, close)
     return *_fit_alone(task, result, division, limits, least), rows
 
 
@@ -146,9 +149,19 @@ def _fit_alone(
     corners = corners.part(bad)
     free = np.full(len(task.toolpath), not limits.no_insert) & task.carries
     free[list(task.toolpath.constraints.no_insert_before)] = False
-    chosen = PointChooser(task, division, limits, free, corners, size[bad]).choose()
-    fitted = with_corners(task, result, division, chosen, np.ones(len(chosen.corner), bool))
-    fitted, after = _fitted(task, fitted)
+    chooser = PointChooser(task, division, limits, free, corners, size[bad])
+
+    def fit(points: ChosenPoints) -> tuple[ChosenPoints, CornerDivision, Floats]:
+        every = np.ones(len(points.corner), bool)
+        return points, *_fitted(task, with_corners(task, result, division, points, every))
+
+    chosen, fitted, after = fit(chooser.choose())
+    beyond = after > 1.0 / ALLOWED
+    if beyond.any():  # their own point took less away than was expected of it
+        more = fit(chooser.choose(np.where(beyond, after / ALONE, 0.0)))
+        still = more[2] > 1.0 / ALLOWED
+        if still.sum() < beyond.sum() and more[2].max() <= after.max():
+            chosen, fitted, after = more
     better = after < BETTER * chosen.before
     if not better.any():
         return result, division
@@ -164,13 +177,14 @@ def _fit_ramps(
     limits: Limits,
     least: LeastPoints,
     anyhow: Ints,
+    close: CloseFits,
 ) -> tuple[CorrectionResult, Subdivision, Ints]:
     """The same with the points on ramps of the force, as few as hold the tolerance, and the rows (L,) of those left,
     but for ``anyhow`` (A,)."""
     least = dict(least)
     while True:
         part, chosen, left = choose_ramp_points(
-            task, result, division, limits, least, FITTED * task.tolerance, anyhow
+            task, result, division, limits, least, FITTED * task.tolerance, anyhow, close
         )
         if chosen is None:
             return result, division, left
@@ -179,9 +193,9 @@ def _fit_ramps(
         enough = ON_RAMPS / ALLOWED
         stated = stated_alone(task)
         fitted, _ = _fitted(stated, fitted, enough)
-        after = _largest(stated, fitted)
         at_vertex = part.share[chosen.corner] == 1.0  # else where the ramp ends
         taken = np.isin(part.source[chosen.corner] + at_vertex, anyhow)
+        after = _largest(stated, fitted, taken)
         bad = ~(after <= enough) & ~taken
         if not bad.any():
             fits = fitted.division.fits
@@ -272,16 +286,20 @@ def _fitted(
     return fitted.moved(task, best), least
 
 
-def _largest(task: CompensationProblem, fitted: CornerDivision) -> Floats:
-    """(G,) the largest errors of the corners, looked for closely, in parts of the allowed one."""
+def _largest(task: CompensationProblem, fitted: CornerDivision, accepted: Bools) -> Floats:
+    """(G,) the largest errors of the corners, looked for closely, in parts of the allowed one; those on motions beside
+    a corner that is ``accepted`` (G,) anyhow are its own: no points of the next corner make them less."""
     largest = np.zeros(len(fitted.group_start) - 1)
+    points = fitted.motion[accepted[fitted.group]]
+    beside = np.union1d(points, points + 1)
     for part in blocks(len(largest), BLOCK):
         first, last = fitted.group_start[part.start], fitted.group_start[part.stop]
         motions = fitted.motion[first:last]
         output = RoundedOutput(task, fitted.division, np.unique(np.concatenate([motions, motions + 1])))
         group, at, share = _samples(fitted, output, part).by_segment
-        size = _size(task, *output.peaks(at, share))
-        np.maximum.at(largest, group, size)
+        own = accepted[group] | ~np.isin(output.motions[at[:, 0]], beside)
+        size = _size(task, *output.peaks(at[own], share[own]))
+        np.maximum.at(largest, group[own], size)
     return largest
 
 

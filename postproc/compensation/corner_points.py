@@ -63,10 +63,12 @@ class PointChooser:
         self.output = RoundedOutput(task, division, corners.motion)
         # of each segment, what the corners at its start and at its end take of its length [m]
         self.taken = np.zeros((2, len(self.output.motions)))
-        self.taken[1], self.taken[0, 1:] = 2.0 * self.output.reach, 2.0 * self.output.reach[:-1]
 
-    def choose(self) -> ChosenPoints:
-        """Points of all corners, the worst first, as many as may be inserted."""
+    def choose(self, remaining: Floats | float = 0.0) -> ChosenPoints:
+        """Points of all corners, the worst first, as many as may be inserted; where ``remaining`` (K,) is more than the
+        error before, by that, and outside of what the program rounds off where that is shorter than a motion."""
+        errors = np.maximum(self.before, remaining)
+        self.taken[1], self.taken[0, 1:] = 2.0 * self.output.reach, 2.0 * self.output.reach[:-1]
         spare = self.limits.inserted(len(self.task.toolpath)) - self.division.inserted
         places = self.output.place(self.corners.motion)
         own = original_reach(self.task, self.corners.row)
@@ -74,10 +76,12 @@ class PointChooser:
         own = np.where(at_end & (self._rounded_off(places, own) > LITTLE * self.task.tolerance), own, 0.0)
         inner = np.zeros(len(places), bool)
         found: list[tuple[int, int, float]] = []
-        for k in np.argsort(-self.before, kind="stable").tolist():
-            if self.before[k] * ALONE <= AIM or spare < 1:
+        for k in np.argsort(-errors, kind="stable").tolist():
+            if errors[k] * ALONE <= AIM or spare < 1:
                 continue
-            points, inside = self._around(int(places[k]), float(own[k]), float(self.before[k]))
+            outside = errors[k] > self.before[k] and 2.0 * own[k] < self._least(int(places[k]))
+            rounding = 0.0 if outside else float(own[k])
+            points, inside = self._around(int(places[k]), rounding, float(errors[k]))
             if 0 < len(points) <= spare:
                 found += [(k, *point) for point in points]
                 inner[k], spare = inside, spare - len(points)
@@ -131,6 +135,10 @@ class PointChooser:
                 points.append((row, share + away if side else share - away))
             self.taken[1 - side, at + side] = count * step + least
         return points, pieces > 1 and len(points) == 2 * count
+
+    def _least(self, at: int) -> float:
+        """[m] the shortest motion beside the corner at the end of the segment ``at``."""
+        return max(self._side(self.output.segments, at + k, k)[0] for k in (0, 1))
 
     def _side(self, segments: PathSegments, at: int, later: int) -> tuple[float, float, int, float, float]:
         """Of the segment ``at``, before a corner or ``later`` than it: the shortest step [m], the room [m] for points,

@@ -121,7 +121,7 @@ class Curves:
 
 
 @dataclass
-class _Polygons:
+class Polygons:
     """Polygons of K points (G, K, 3) with S places on them: off (G, S, 3) across the curves, slope (G, S, 3, V): by how
     much the V coordinates of the inner points change it, parameter (G, S) of the nearest places of the curves; label
     (G, K): parameters of the points."""
@@ -147,9 +147,9 @@ def fit_points(
     where on points are rounded off; shortest (G, K - 1) [m]: lines.  enough [m]: a distance that needs no improvement.
     vertex: which of the points is that between the motions.
     """
-    points = _apart(curves.at(parameter)[0], shortest)
-    best = _evaluate(curves, points, reach, None, parameter, vertex)
-    largest = np.where(_long_enough(points, shortest), best.largest, np.inf)
+    points = moved_apart(curves.at(parameter)[0], shortest)
+    best = evaluate_polygons(curves, points, reach, None, parameter, vertex)
+    largest = np.where(long_enough(points, shortest), best.largest, np.inf)
     trust, damping = np.full(len(points), FIRST), np.full(len(points), 1e-2)
     for _ in range(STEPS):
         some = np.flatnonzero((largest > enough) & (trust > SHORTEST))
@@ -160,9 +160,11 @@ def fit_points(
         step *= np.minimum(1.0, trust[some] / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-15))[:, None, None]
         moved = best.points[some]
         moved[:, 1:-1] += step
-        moved = _apart(moved, shortest[some])
-        found = _evaluate(curves[some], moved, reach[some], best.parameter[some], best.label[some], vertex)
-        after = np.where(_long_enough(moved, shortest[some]), found.largest, np.inf)
+        moved = moved_apart(moved, shortest[some])
+        found = evaluate_polygons(
+            curves[some], moved, reach[some], best.parameter[some], best.label[some], vertex
+        )
+        after = np.where(long_enough(moved, shortest[some]), found.largest, np.inf)
         won = after < largest[some]
         at = some[won]
         for name in ("points", "off", "slope", "parameter", "label"):
@@ -178,12 +180,12 @@ def _sizes(vectors: Floats) -> Floats:
     return np.asarray(np.sqrt(np.sum(vectors * vectors, axis=-1)))
 
 
-def _long_enough(points: Floats, shortest: Floats) -> Bools:
+def long_enough(points: Floats, shortest: Floats) -> Bools:
     """(G,) whether no line of the points (G, K, 3) is shorter than ``shortest`` (G, K - 1) [m]."""
     return np.asarray((_sizes(np.diff(points, axis=1)) >= shortest - TOO_SHORT).all(axis=1))
 
 
-def _apart(points: Floats, shortest: Floats) -> Floats:
+def moved_apart(points: Floats, shortest: Floats) -> Floats:
     """The points (G, K, 3) with the inner ones moved so far apart that lines are ``shortest`` (G, K - 1) [m] or longer;
     some are shorter still where there is no room."""
     inner = np.ones(points.shape[1])
@@ -222,9 +224,9 @@ def _least_largest(off: Floats, slope: Floats, damping: Floats) -> Floats:
     return best
 
 
-def _evaluate(
+def evaluate_polygons(
     curves: Curves, points: Floats, reach: Floats, near: Floats | None, label: Floats, vertex: int
-) -> _Polygons:
+) -> Polygons:
     """The polygons (G, K, 3) against their curves; the nearest places are looked for from ``near`` (G, S), or from
     where the points have the parameters ``label`` (G, K)."""
     label = _labels(curves, points, label, vertex)
@@ -243,7 +245,7 @@ def _evaluate(
     # where a place moves, that of the curve follows: (place - here) stays square to the tangent
     ahead = along / np.maximum(np.sum(along * tangent, axis=2), FLATTEST)[..., None]
     slope = slope - ahead[..., None] * np.einsum("gsi,gsiv->gsv", tangent, slope)[:, :, None, :]
-    return _Polygons(points, off, slope, at, label)
+    return Polygons(points, off, slope, at, label)
 
 
 def _labels(curves: Curves, points: Floats, label: Floats, vertex: int) -> Floats:

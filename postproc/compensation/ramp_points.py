@@ -8,7 +8,7 @@ their coordinates are fitted to the curve of the commands by which the tool is o
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,8 +19,16 @@ from postproc.compensation.approximations import approximations
 from postproc.compensation.corner_division import commands_on_path, commands_on_rounded_path
 from postproc.compensation.corner_points import ChosenPoints, shortest_arc
 from postproc.compensation.correct import CorrectionResult
-from postproc.compensation.point_fit import Curves, fit_points
+from postproc.compensation.point_fit import Curves
 from postproc.compensation.problem import CompensationProblem
+from postproc.compensation.ramp_fits import (
+    CLOSE_STARTS,
+    STARTS,
+    CloseFits,
+    FittedPoints,
+    FittedRamps,
+    fit_ramps,
+)
 from postproc.compensation.rounded_path import original
 from postproc.compensation.subdivision import Limits, Subdivision
 from postproc.toolpath import Role
@@ -47,51 +55,20 @@ NEAREST = 1e-9
 PLACES = 440
 """Places of a curve."""
 
-ENOUGH = 0.85
-"""Share of the allowed error with which a fit ends."""
-
 PAYS = 0.9
 """Share of the error that is left which a fit with more points has to come below."""
+
+PAYS_CLOSE = 0.97
+"""The same of a close fit."""
+
+SEARCHED = 8
+"""Ramps that no fit holds and that are fitted closely: the first of a program."""
 
 SHOWS = 0.9
 """Share of the tolerance: ramps whose ends are rounded off by less keep the one point that they have."""
 
 APART = 0.1
 """Share of the shortest line by which points are apart along the path of the program at least."""
-
-
-@dataclass(frozen=True)
-class _FittedRamps:
-    """G ramps.  vertex, knot (G,): the motions of the division that end where the ramp starts and where it ends; row
-    (G,): of the program, with the ramp; end [m] (G,): its length; exact (G,): the vertex is; reach (G, 2) [m]: from
-    where on points before and after the vertex are rounded off; spacing (G, 2) [m]: the shortest motion before and
-    after the vertex; margin (G, 2) [m]: as far the curve goes on before and after; after (G,): the motion that ends in
-    the next point after those of the ramp; arc (G, 2): the motions before and after the vertex are."""
-
-    vertex: Ints
-    knot: Ints
-    row: Ints
-    end: Floats
-    exact: Bools
-    reach: Floats
-    spacing: Floats
-    margin: Floats
-    after: Ints
-    arc: Bools
-
-    def __getitem__(self, chosen: Ints | Bools) -> _FittedRamps:
-        return _FittedRamps(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
-
-
-@dataclass(frozen=True)
-class _FittedPoints:
-    """Points of one ramp: places (n, 3), path lengths (n,) [m] from the vertex, which of them is the motion that is
-    there already, and the largest error [m]."""
-
-    place: Floats
-    along: Floats
-    own: int
-    largest: float
 
 
 def choose_ramp_points(
@@ -102,26 +79,40 @@ def choose_ramp_points(
     least: LeastPoints,
     allowed: float,
     anyhow: Ints,
+    close: CloseFits,
 ) -> tuple[Subdivision, ChosenPoints | None, Ints]:
     """The division without the points of those ramps for which others were found, these, and the rows (L,) of the ramps
-    left.  allowed [m]: error; for ramps of the rows ``anyhow`` (A,) what comes nearest will do where nothing holds it.
+    left.  allowed [m]: error; for ramps of the rows ``anyhow`` (A,) what comes nearest will do where nothing holds it;
+    ``close``: fits that were done already.
     """
     ramps, inner, fewest = _ramps(task, result, division, limits, least)
     if not len(ramps.row):
         return division, None, np.empty(0, np.int64)
     curves = _curves(task, division, ramps)
     spare = limits.inserted(len(task.toolpath)) - division.inserted
-    found: dict[int, _FittedPoints] = {}
-    nearest: dict[int, _FittedPoints] = {}
+    found: dict[int, FittedPoints] = {}
+    nearest: dict[int, FittedPoints] = {}
     left = np.arange(len(ramps.row))
-    for count in range(1, len(_STARTS) + 1):
+    for count in range(1, len(STARTS) + 1):
         some = left[(fewest[left] <= count) & (count <= inner[left] + spare)]
-        for name, one in _fitted(ramps[some], curves[some], count, allowed, some).items():
+        for name, one in fit_ramps(ramps[some], curves[some], count, allowed, some).items():
             if one.largest <= allowed:
                 found[name] = one
             elif name not in nearest or one.largest < PAYS * nearest[name].largest:
                 nearest[name] = one
         left = np.array([k for k in left if k not in found], np.int64)
+    for name in left[~ramps.exact[left]][:SEARCHED].tolist():
+        for number, (words, _) in enumerate(CLOSE_STARTS):
+            if not fewest[name] <= len(words) - 1 <= inner[name] + spare:
+                continue
+            near = close.fit(ramps[np.array([name])], curves[np.array([name])], number, allowed)
+            if near is None:
+                continue
+            if near.largest <= allowed:
+                found[name] = near
+                break
+            if name not in nearest or near.largest < PAYS_CLOSE * nearest[name].largest:
+                nearest[name] = near
     wanted = np.isin(ramps.row, anyhow).tolist()
     found |= {name: one for name, one in nearest.items() if name not in found and wanted[name]}
     part, chosen = _without_points(task, division, ramps, found)
@@ -134,7 +125,7 @@ def _ramps(
     division: Subdivision,
     limits: Limits,
     least: LeastPoints,
-) -> tuple[_FittedRamps, Ints, Ints]:
+) -> tuple[FittedRamps, Ints, Ints]:
     """The ramps that end in an inserted point of their motion, alone and away from others; and (G,) how many points are
     inserted for each, and have to be at least."""
     none = np.empty(0, np.int64)
@@ -142,7 +133,7 @@ def _ramps(
     inserted = np.flatnonzero((division.role == Role.INTERMEDIATE) & (division.share < 1.0))
     if parts is None or not len(inserted) or limits.no_insert:
         return (
-            _FittedRamps(
+            FittedRamps(
                 none,
                 none,
                 none,
@@ -219,7 +210,7 @@ def _ramps(
         inner + _rounded_off(task, division, vertex, knot, end, most) > 1
     )
     chosen = np.flatnonzero(good)[:MOST]
-    ramps = _FittedRamps(vertex, knot, row, end, exact, reach, spacing, margin, vertex + inner + 1, arc)
+    ramps = FittedRamps(vertex, knot, row, end, exact, reach, spacing, margin, vertex + inner + 1, arc)
     return ramps[chosen], inner[chosen], fewest[chosen]
 
 
@@ -238,7 +229,7 @@ def _rounded_off(
     return np.asarray(0.25 * reach * lengths(shift[1] - shift[0]) / end > SHOWS * task.tolerance)
 
 
-def _curves(task: CompensationProblem, division: Subdivision, ramps: _FittedRamps) -> Curves:
+def _curves(task: CompensationProblem, division: Subdivision, ramps: FittedRamps) -> Curves:
     """Commands by which the tool is on the rounded path of the program, from before the vertex (there, where it is
     exact) to after the ramp."""
     rounded = np.stack([~ramps.exact, np.ones(len(ramps.row), bool)], axis=1)
@@ -276,111 +267,8 @@ def _curves(task: CompensationProblem, division: Subdivision, ramps: _FittedRamp
     return Curves(first, step, ends, turn, place, tangent, ramps.arc, unrounded)
 
 
-_V, _E = "vertex", "end"
-_STARTS: tuple[tuple[tuple[tuple[str, float], ...], ...], ...] = (
-    (((_V, 0.0), (_E, 0.0)),),
-    (
-        ((_V, 0.0), (_V, 1.0), (_E, 0.0)),
-        ((_V, -1.0), (_V, 0.0), (_E, 0.0)),
-        ((_V, 0.0), (_E, -1.0), (_E, 0.0)),
-        ((_V, 0.0), (_E, 0.0), (_E, 1.0)),
-    ),
-    (
-        ((_V, -1.0), (_V, 0.0), (_V, 1.0), (_E, 0.0)),
-        ((_V, 0.0), (_V, 1.0), (_E, -1.0), (_E, 0.0)),
-        ((_V, 0.0), (_V, 1.0), (_E, 0.0), (_E, 1.0)),
-    ),
-    (
-        ((_V, -1.0), (_V, 0.0), (_V, 1.0), (_E, 0.0), (_E, 1.0)),
-        ((_V, -1.0), (_V, 0.0), (_V, 1.0), (_E, -1.0), (_E, 0.0)),
-    ),
-    (
-        ((_V, -1.0), (_V, 0.0), (_V, 1.0), (_V, 2.0), (_E, 0.0), (_E, 1.0)),
-        ((_V, -1.0), (_V, 0.0), (_V, 1.0), (_E, -1.0), (_E, 0.0), (_E, 1.0)),
-    ),
-)
-"""Where 1, 2, ... inserted points and that of an approximated vertex may start: beside the vertex, in parts of
-``BESIDE`` of its approximation, or beside the end of the ramp, in parts of the shortest motion."""
-
-BESIDE = 0.75
-"""Share of the approximation."""
-
-SPARE = 1.02
-"""A line is longer by this factor than the shortest, where points start: they are to move."""
-
-
-def _starts(ramps: _FittedRamps, curves: Curves, count: int) -> tuple[Floats, Ints]:
-    """(T, G, n) [m] from the vertex, and (T,) which of them is the vertex (the ramp's end where that is exact)."""
-    beside = np.maximum(BESIDE * ramps.reach[:, :1], ramps.spacing)
-    starts = [_apart(ramps, curves, words, beside) for words in _STARTS[count - 1]]
-    return np.stack(starts), np.array([words.index((_V, 0.0)) for words in _STARTS[count - 1]])
-
-
-def _exact_starts(ramps: _FittedRamps, curves: Curves, count: int) -> tuple[Floats, Ints]:
-    """As ``_starts``, of ramps that start at an exact vertex: it stays where it is."""
-    steps: tuple[tuple[float, ...], ...] = {
-        1: ((0.0,),),
-        2: ((0.0, 1.0), (-1.0, 0.0)),
-        3: ((-1.0, 0.0, 1.0),),
-    }.get(count, ())
-    starts = [_apart(ramps, curves, tuple((_E, k) for k in each), ramps.spacing) for each in steps]
-    return np.array(starts), np.array([each.index(0.0) for each in steps], np.int64)
-
-
-def _apart(
-    ramps: _FittedRamps, curves: Curves, words: tuple[tuple[str, float], ...], beside: Floats
-) -> Floats:
-    """(G, n) [m] from the vertex, where the points ``words`` lie on the curves: ``beside`` (G, 2) [m] before and after
-    the vertex, the shortest motion before and after the end of the ramp, or farther, until no line is too short."""
-    found = np.empty((len(ramps.row), len(words)))
-    for at, centre in ((_V, np.zeros(len(ramps.row))), (_E, ramps.end)):
-        for way in (-1, 1):
-            step = beside[:, max(way, 0)] if at == _V else ramps.spacing[:, 1]
-            least = ramps.spacing[:, max(way, 0)] if at == _V else ramps.spacing[:, 1]
-            last = centre
-            mine = [n for n, (other, k) in enumerate(words) if other == at and k * way >= 0]
-            for n in sorted(mine, key=lambda n: abs(words[n][1])):
-                if words[n][1]:
-                    last = curves.away(last, centre + words[n][1] * step, SPARE * least, way)
-                found[:, n] = last
-    return found
-
-
-def _fitted(
-    ramps: _FittedRamps, curves: Curves, count: int, allowed: float, names: Ints
-) -> dict[int, _FittedPoints]:
-    """The points of ramps with ``count`` inserted ones that are within ``allowed`` [m], or come nearest to it, by
-    ``names`` (G,)."""
-    found: dict[int, _FittedPoints] = {}
-    for exact in (False, True):
-        some = np.flatnonzero(ramps.exact == exact)
-        if not len(some):
-            continue
-        starts, own = (_exact_starts if exact else _starts)(ramps[some], curves[some], count)
-        left = np.arange(len(some))
-        for start, place in zip(starts, own.tolist(), strict=True):
-            part, curve = ramps[some[left]], curves[some[left]]
-            first = curve.first if exact else curve.ends[:, 0]
-            parameter = np.column_stack([first, start[left], curve.ends[:, 1]])
-            width = parameter.shape[1]
-            before = np.arange(width) <= (-1 if exact else place + 1)
-            reach = np.where(before, part.reach[:, :1], part.reach[:, 1:])
-            vertex = 0 if exact else place + 1
-            shortest = np.where(np.arange(width - 1) < vertex, part.spacing[:, :1], part.spacing[:, 1:])
-            points, largest = fit_points(curve, parameter, reach, shortest, ENOUGH * allowed, vertex)
-            along = curve.nearest(points, parameter)[:, 1:-1]
-            for k, size in enumerate(largest.tolist()):
-                name = int(names[some[left[k]]])
-                if name not in found or size < found[name].largest:
-                    found[name] = _FittedPoints(points[k, 1:-1], along[k], place, size)
-            left = left[largest > allowed]
-            if not len(left):
-                break
-    return found
-
-
 def _without_points(
-    task: CompensationProblem, division: Subdivision, ramps: _FittedRamps, fitted: dict[int, _FittedPoints]
+    task: CompensationProblem, division: Subdivision, ramps: FittedRamps, fitted: dict[int, FittedPoints]
 ) -> tuple[Subdivision, ChosenPoints | None]:
     """The division without the points of the ramps that were ``fitted``, but one of those after exact vertices; and
     what is inserted instead."""

@@ -8,7 +8,7 @@ from postproc.base.arrays import Floats
 from postproc.base.units import MM
 from postproc.cell import Cell
 from postproc.compensation.problem import CompensationProblem
-from postproc.compensation.ramped_forces import ASSUMED, EarlyShares
+from postproc.compensation.ramped_forces import ASSUMED, ASSUMED_TIME, EarlyShares
 from postproc.process import Wrenches
 from postproc.toolpath import Toolpath
 
@@ -24,7 +24,7 @@ def nearest_point(cell: Cell) -> float:
 def ramp_lengths(cell: Cell, path: Toolpath, force: Wrenches) -> Floats:
     """(N,) [m] path over which a force that steps inside a cut goes over: as the cell states; with a stock, in
     which the change of the engagement is known, the shortest motion; else the cutter's radius where the process or the
-    cell's tool states it."""
+    cell's tool states it, or what is assumed."""
     if cell.force_ramp is not None:
         return np.broadcast_to(cell.force_ramp, (len(path),))
     if force.stock is not None:
@@ -35,11 +35,16 @@ def ramp_lengths(cell: Cell, path: Toolpath, force: Wrenches) -> Floats:
         if tool is not None and tool.diameter is not None:
             radius[index] = 0.5 * tool.diameter
     if force.radius is None and np.isnan(radius).all():
-        return np.broadcast_to(ASSUMED, (len(path),))
+        return _assumed(path)
     ramp = radius[path.tool]
     if force.radius is not None:
         ramp = np.where(np.isnan(force.radius), ramp, force.radius)
-    return np.where(np.isnan(ramp), ASSUMED, ramp)
+    return np.where(np.isnan(ramp), _assumed(path), ramp) if np.isnan(ramp).any() else ramp
+
+
+def _assumed(path: Toolpath) -> Floats:
+    """(N,) [m]"""
+    return np.fmax(ASSUMED, ASSUMED_TIME * path.feed)
 
 
 def early_shares(cell: Cell, task: CompensationProblem) -> EarlyShares | None:

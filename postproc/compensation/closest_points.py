@@ -1,0 +1,105 @@
+"""Points of a rounded polygon as near to a curve as points that keep their distance can be.
+
+``point_fit`` finds points that are near enough for most ramps at once, and moves those apart that came too near to each
+other.  Where lines as short as they may be decide how near a polygon comes, that is no way to the best of them.  Here
+each step is a linear programme: by the slopes of the errors it makes the largest of them least, within a box around the
+points, and with no line shorter than it may be.  The length of a line is convex in its ends: one that is long enough by
+its slope is so in truth (sequential linear programming: Fletcher and Sainz de la Maza 1989).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.base.arrays import Floats
+from postproc.base.units import MM
+from postproc.compensation.point_fit import (
+    LONGEST,
+    Curves,
+    Polygons,
+    evaluate_polygons,
+    long_enough,
+    moved_apart,
+)
+
+STEPS = 40
+"""Linear programmes of a search."""
+
+FIRST, SHORTEST = 0.3 * MM, 1e-6
+"""[m] The box around the points: at first, and where the search ends."""
+
+WIDER, NARROWER = 2.0, 0.35
+"""The box after a step that came nearer, and after one that did not."""
+
+SOME, GAIN = 6, 0.995
+"""So many steps in which no more than this share remains of the error, or the search ends."""
+
+LITTLE = 0.2
+"""Errors below this share of the largest are left out of a step."""
+
+ANGLES = np.arange(8) * np.pi / 4
+"""[rad] In these directions from itself an error is bounded, square to the curve."""
+
+MICRO = 1e6
+"""The programme is solved in um: its solver takes 1e-7 for nothing."""
+
+
+def closest_points(
+    curve: Curves, parameter: Floats, reach: Floats, shortest: Floats, enough: float, vertex: int
+) -> tuple[Floats, float]:
+    """As ``fit_points``, of one curve: points (1, K, 3) [m] from where they have the ``parameter`` (1, K) [m] on, and
+    their largest distance [m] from it, inf where they have no room."""
+    points = moved_apart(curve.at(parameter)[0], shortest)
+    best = evaluate_polygons(curve, points, reach, None, parameter, vertex)
+    if not long_enough(points, shortest)[0]:
+        return points, np.inf
+    box, past = FIRST, [float(best.largest[0])]
+    for _ in range(STEPS):
+        if past[-1] <= enough or box < SHORTEST or (len(past) > SOME and past[-1] > GAIN * past[-1 - SOME]):
+            break
+        step = _step(curve, best, shortest[0], box)
+        moved = best.points.copy()
+        moved[0, 1:-1] += step
+        found = evaluate_polygons(curve, moved, reach, best.parameter, best.label, vertex)
+        if long_enough(moved, shortest)[0] and found.largest[0] < past[-1]:
+            best, box = found, min(WIDER * box, LONGEST)
+            past.append(float(found.largest[0]))
+        else:
+            box *= NARROWER
+    return best.points, past[-1]
+
+
+def _step(curve: Curves, polygon: Polygons, shortest: Floats, box: float) -> Floats:
+    """(K - 2, 3) [m] by how much the inner points move, ``box`` [m] at most in each coordinate."""
+    from scipy.optimize import linprog  # where it is needed alone
+
+    off, slope = polygon.off[0], polygon.slope[0]
+    size = np.linalg.norm(off, axis=1)
+    some = size > LITTLE * size.max()
+    off, slope, size = off[some], slope[some], size[some]
+    tangent = curve.at(polygon.parameter)[1][0][some]
+    one = off / np.maximum(size, 1e-15)[:, None]
+    two = np.cross(tangent, one)
+    two /= np.maximum(np.linalg.norm(two, axis=1), 1e-15)[:, None]
+    ways = np.cos(ANGLES)[:, None, None] * one + np.sin(ANGLES)[:, None, None] * two
+    width = slope.shape[2]
+    errors = np.einsum("dsk,skv->dsv", ways, slope).reshape(-1, width)
+    now = np.einsum("dsk,sk->ds", ways, off).ravel()
+
+    line = np.diff(polygon.points[0], axis=0)
+    length = np.linalg.norm(line, axis=1)
+    line /= length[:, None]
+    count = len(length)
+    shorter = np.zeros((count, count + 1, 3))
+    numbers = np.arange(count)
+    shorter[numbers, numbers], shorter[numbers, numbers + 1] = line, -line
+    lines = shorter[:, 1:-1].reshape(count, width)
+
+    rows = np.block([[errors, -np.ones((len(errors), 1))], [lines, np.zeros((count, 1))]])
+    most = MICRO * np.concatenate([-now, np.minimum(length - shortest, 1.0)])
+    sides = [(-MICRO * box, MICRO * box)] * width
+    solved = linprog(
+        np.append(np.zeros(width), 1.0), rows, most, bounds=[*sides, (0.0, None)], method="highs"
+    )
+    step = np.zeros(width) if solved.x is None else solved.x[:width] / MICRO
+    return np.asarray(step.reshape(-1, 3))
