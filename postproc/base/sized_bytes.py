@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Iterable
 
-from postproc.base.paged_memory import room_in_file
+from postproc.base.paged_memory import LOOK, release_pages, room_in_file
 
 _new_bytes = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_char_p, ctypes.c_ssize_t)(
     ("PyBytes_FromStringAndSize", ctypes.pythonapi)
@@ -33,8 +33,13 @@ class SizedBytes:
             self.more.append(bytes(part[fitting:]))
 
     def write_all(self, parts: Iterable[bytes | memoryview]) -> None:
+        written = 0
         for part in parts:
             self.write(part)
+            written += len(part)
+            if written > LOOK:
+                release_pages()
+                written = 0
 
     def done(self) -> bytes:
         """What was written; nothing can be written from now on."""
