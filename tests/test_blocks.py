@@ -69,14 +69,18 @@ def test_blocks_leave_no_row_out():
 
 
 @pytest.mark.parametrize("span", [1, 5, 64, 10_000])
-@pytest.mark.parametrize("chosen", [[], [0], [63, 64], [0, 1, 2, 3, 4, 5, 90], list(range(0, 1000, 7)), [999]])
+@pytest.mark.parametrize(
+    "chosen", [[], [0], [63, 64], [0, 1, 2, 3, 4, 5, 90], list(range(0, 1000, 7)), [999]]
+)
 def test_blocks_of_rows_here_and_there_lie_close_together(monkeypatch, span, chosen):
     monkeypatch.setattr(batches, "SPAN", span)
     rows = np.array(chosen, int)
     parts = spans(rows, 4)
     assert [row for part in parts for row in rows[part]] == chosen
     assert all(0 < len(rows[part]) <= 4 and np.ptp(rows[part]) < span for part in parts)
-    assert list(in_spans(lambda part: rows[part].tolist(), rows, 4)) == [rows[part].tolist() for part in parts]
+    assert list(in_spans(lambda part: rows[part].tolist(), rows, 4)) == [
+        rows[part].tolist() for part in parts
+    ]
     values = np.random.default_rng(1).random((1000, 2))
     assert np.array_equal(taken(values, rows), values[rows])
 
