@@ -23,23 +23,25 @@ class SizedBytes:
         first = id(self.text) + bytes.__basicsize__ - 1
         self.rest = memoryview((ctypes.c_char * size).from_address(first)).cast("B")
         self.more: list[bytes] = []
+        self.since = 0
 
     def write(self, part: bytes | memoryview) -> None:
         """Put ``part`` behind what is there."""
-        fitting = min(len(part), len(self.rest))
-        self.rest[:fitting] = part[:fitting]
-        self.rest = self.rest[fitting:]
+        fitting, view = min(len(part), len(self.rest)), memoryview(part)
+        for at in range(0, fitting, LOOK):  # nobody else works, or gives pages back, while bytes are copied
+            size = min(LOOK, fitting - at)
+            self.rest[:size] = view[at : at + size]
+            self.rest = self.rest[size:]
+            self.since += size
+            if self.since >= LOOK:
+                self.since = 0
+                release_pages()
         if fitting < len(part):
             self.more.append(bytes(part[fitting:]))
 
     def write_all(self, parts: Iterable[bytes | memoryview]) -> None:
-        written = 0
         for part in parts:
             self.write(part)
-            written += len(part)
-            if written > LOOK:
-                release_pages()
-                written = 0
 
     def done(self) -> bytes:
         """What was written; nothing can be written from now on."""
