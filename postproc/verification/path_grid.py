@@ -33,7 +33,7 @@ class PathGrid:
 
     row (J,) and share (J,) of its path; arc (J,) [m] along the stretch; v (J, 3) [m], tangent (J, 3); gap (J,): the
     interval to the next node is within one vertex; of the last node of a stretch there is none.  goal_at (J, 3) [m];
-    displaced (J, m) [rad, m]: the coordinates by load, NaN without a rest; farthest [m]: the largest displacement.
+    farthest [m]: the largest displacement.
     """
 
     original: CompensationProblem
@@ -46,7 +46,6 @@ class PathGrid:
     tangent: Floats
     gap: Bools
     goal_at: Floats
-    displaced: Floats
     farthest: float
 
     @staticmethod
@@ -67,7 +66,6 @@ class PathGrid:
         own = before[:-1] - np.repeat(before[sums(count)[:-1]], count)
         arc = own[number] + share * length[number]
         v, tangent, goals = (np.empty((len(row), 3)) for _ in range(3))
-        displaced = np.empty((len(row), original.model.chain.size), np.float32)
 
         def fill(part: slice) -> None:
             there, tangent[part] = path.pose_and_tangent(row[part], share[part])
@@ -75,12 +73,11 @@ class PathGrid:
             real = original.simulated(row[part], there, wrench, share=share[part])
             goal = original.goal(row[part], there, share[part]).position
             goals[part], v[part] = goal, goal - np.nan_to_num(real.pose.position - there.position)
-            displaced[part] = np.where(real.settled[:, None], real.displacement, np.nan)
 
         each_block(fill, len(row))
         gap = np.append(row[1:] != row[:-1], True)[: len(row)]
         farthest = float(lengths(goals - v).max(initial=0.0))
-        return PathGrid(original, path, first, row, share, arc, v, tangent, gap, goals, displaced, farthest)
+        return PathGrid(original, path, first, row, share, arc, v, tangent, gap, goals, farthest)
 
     @cached_property
     def on_the_spot(self) -> Bools:
@@ -101,13 +98,6 @@ class PathGrid:
         """(S,) [m] along the stretch, at ``part`` (S,) of ``interval`` (S,)."""
         step = self.arc[interval + 1] - self.arc[interval]
         return self.arc[interval] + part * step
-
-    def displacement(self, interval: Ints, part: Floats) -> Floats | None:
-        """(S, m) [rad, m] about that of a tool at ``part`` (S,) of ``interval`` (S,), to find its rest from there; None
-        where one has none."""
-        before, after = self.displaced[interval], self.displaced[interval + 1]
-        there = before + part[:, None] * (after - before)
-        return there if np.isfinite(there).all() else None
 
     def goal(self, interval: Ints, part: Floats) -> tuple[Poses, Floats, Floats]:
         """Goal poses (S), tangents (S, 3) and wrenches (S, 6) at the parts (S,) of intervals."""

@@ -321,8 +321,7 @@ class _Solution:
         """Where the tools of ``active`` are; the first solution is the start of the next."""
         motion, share, command = self.motion[active], self.share[active], self.command[active]
         if self.q is None:  # asked for all
-            start = self.grid.displacement(self.interval, self.part)
-            real = self.task.simulated(motion, command, wrench, start, share=share, came=self.came)
+            real = self.task.simulated(motion, command, wrench, share=share, came=self.came)
             self.q, self.displacement = real.q.copy(), real.displacement.copy()
             return real
         came = None if self.came is None else self.came[active]
