@@ -77,7 +77,10 @@ def test_blocks_of_rows_here_and_there_lie_close_together(monkeypatch, span, cho
     rows = np.array(chosen, int)
     parts = spans(rows, 4)
     assert [row for part in parts for row in rows[part]] == chosen
-    assert all(0 < len(rows[part]) <= 4 and np.ptp(rows[part]) < span for part in parts)
+    for part in parts:
+        assert min(2, len(rows)) <= len(rows[part]) <= 4 + 2
+        inner = rows[part][1:-1]  # beside them there may be one each that would be alone
+        assert len(inner) < 2 or np.ptp(inner) < span
     assert list(in_spans(lambda part: rows[part].tolist(), rows, 4)) == [
         rows[part].tolist() for part in parts
     ]

@@ -57,15 +57,19 @@ def blocks(count: int, rows: int = 0) -> list[slice]:
 
 def spans(chosen: Ints, rows: int = 0) -> list[slice]:
     """Blocks of ``chosen`` (K,), ascending numbers of rows of a program, of ``ROWS`` each where ``rows`` states nothing
-    else; those of one lie within ``SPAN`` rows."""
+    else; those of one lie within ``SPAN`` rows, but for one that would be alone, as that is rounded otherwise."""
     if not len(chosen):
         return []
     cuts = np.searchsorted(chosen, np.arange(SPAN, int(chosen[-1]) + 1, SPAN)).tolist()
-    return [
-        slice(low + part.start, low + part.stop)
-        for low, high in pairwise([0, *cuts, len(chosen)])
-        for part in blocks(high - low, rows)
-    ]
+    parts: list[slice] = []
+    for low, high in pairwise([0, *cuts, len(chosen)]):
+        for part in blocks(high - low, rows):
+            first, stop = low + part.start, low + part.stop
+            if parts and (parts[-1].stop - parts[-1].start == 1 or stop - first == 1 == len(chosen) - first):
+                parts[-1] = slice(parts[-1].start, stop)
+            else:
+                parts.append(slice(first, stop))
+    return parts
 
 
 def in_blocks(work: Callable[[slice], T], count: int, rows: int = 0) -> Iterator[T]:

@@ -19,7 +19,9 @@ WALL = {1_000_000: 20.0}
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--sizes", default="10000,100000,1000000", help="motions, between commas [%(default)s]")
+    parser.add_argument(
+        "--sizes", default="10000,100000,1000000", help="motions, between commas [%(default)s]"
+    )
     parser.add_argument("--language", choices=MAKERS, default="krl")
     asked = parser.parse_args()
     print(heading())
