@@ -36,9 +36,10 @@ PRICE = 60_000
 """Bytes of a program from which on blocks of one row are left to others: a sample takes minutes with them."""
 
 
-def programs(count: int, folder: Path) -> Iterator[tuple[str, Path]]:
+def programs(count: int, folder: Path, samples: bool) -> Iterator[tuple[str, Path]]:
     """Name and file of each program, in a folder of its own."""
-    for sample in sorted(path for path in SAMPLES.glob("*/*") if path.suffix in SUFFIXES):
+    found = sorted(path for path in SAMPLES.glob("*/*") if path.suffix in SUFFIXES)
+    for sample in found if samples else ():
         there = folder / sample.parent.name
         if not there.exists():
             shutil.copytree(sample.parent, there)
@@ -81,12 +82,15 @@ def set_work(rows: int, threads: int, paged: bool) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--programs", type=int, default=100, help="that are drawn [%(default)s]")
+    parser.add_argument("--without-samples", action="store_true", help="drawn programs alone")
     parser.add_argument("--digests", type=Path, help="written, or compared where it is there")
     asked = parser.parse_args()
     usual, other, runs = batches.ROWS, [], 0
     digests: dict[str, str] = {}
     with tempfile.TemporaryDirectory() as name:
-        for number, (program, path) in enumerate(programs(asked.programs, Path(name))):
+        for number, (program, path) in enumerate(
+            programs(asked.programs, Path(name), not asked.without_samples)
+        ):
             set_work(usual, 1, paged=False)
             digests[program] = results(path)
             for k, threads in enumerate(THREADS):
