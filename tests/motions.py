@@ -7,9 +7,36 @@ import numpy as np
 from postproc.base.geometry import Poses
 from postproc.effects import ChainState, Conditions
 from postproc.robot.chain import Chain
-from postproc.toolpath import Configuration, EditConstraints, FrameRef, Kind, OrientationControl, Toolpath
+from postproc.toolpath import (
+    Configuration,
+    EditConstraints,
+    FrameRef,
+    Kind,
+    MotionSequence,
+    MotionSpeeds,
+    OrientationControl,
+    ProgramComments,
+    Targets,
+    Toolpath,
+)
 
-PARTS = {"constraints": EditConstraints, "orientation_control": OrientationControl}
+PARTS = {
+    "targets": Targets,
+    "speeds": MotionSpeeds,
+    "sequence": MotionSequence,
+    "constraints": EditConstraints,
+    "orientation_control": OrientationControl,
+    "remarks": ProgramComments,
+}
+
+
+def toolpath_of(**columns) -> Toolpath:
+    """A toolpath of its own fields and of those of its ``PARTS``."""
+    for part, type_ in PARTS.items():
+        own = {one.name: columns.pop(one.name) for one in fields(type_) if one.name in columns}
+        if own:
+            columns[part] = type_(**own)
+    return Toolpath(**columns)
 
 
 def milling_angles(count, rng):
@@ -30,12 +57,8 @@ def motions(target: Poses, kind=Kind.LIN, axes=None, status=-1, turn=-1, **more)
     position, rotation = target.position.copy(), target.rotation.copy()
     for row, angles in (axes or {}).items():
         kinds[row], joint[row], position[row], rotation[row] = Kind.AXIS, angles, np.nan, np.nan
-    for part, type_ in PARTS.items():
-        own = {one.name: more.pop(one.name) for one in fields(type_) if one.name in more}
-        if own:
-            more[part] = type_(**own)
     world = Poses.identity()
-    return Toolpath(
+    return toolpath_of(
         kind=kinds,
         position=position,
         rotation=rotation,

@@ -53,7 +53,7 @@ class Brute:
         self.ready: Prepared = prepare(Request(program, force=""))
         task = self.task = self.ready.task
         path = task.toolpath
-        self.rows = np.flatnonzero(path.known & ~path.on_axes & (task.track.status >= 0))
+        self.rows = np.flatnonzero(path.known & ~path.on_axes & (task.track.branch >= 0))
         self.cuts = np.isin(self.rows, np.flatnonzero(task.carries))
         cell = yaml.safe_load(self.ready.cell.path.read_text())
         self.origin = np.array([cell["bases"][1][key] for key in "xyz"]) / 1e3
@@ -76,7 +76,7 @@ class Brute:
         flange = Poses(rotation @ back.rotation, position + rotation @ back.position)
         robot, task = self.ready.robot, self.task
         rows = self.rows[some]
-        solution = inverse(robot.nominal, flange, task.track.status[rows], task.track.q[rows])
+        solution = inverse(robot.nominal, flange, task.track.branch[rows], task.track.q[rows])
         if not solution.reachable.all():
             return lost
         q = solution.q

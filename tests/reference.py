@@ -11,5 +11,5 @@ def reference_flange(chain, q):
     data, found = chain.model.createData(), []
     for state in chain.placed(q)[: chain.model.nq].T:
         pin.framesForwardKinematics(chain.model, data, state)
-        found.append(data.oMf[chain.flange_id].copy())
+        found.append(data.oMf[chain.model.getFrameId("flange")].copy())
     return Poses(np.array([at.rotation for at in found]), np.array([at.translation for at in found]))

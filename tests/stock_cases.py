@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from motions import toolpath_of
 
 pytest.importorskip("numba")
 
@@ -18,7 +19,7 @@ from postproc.process.stock.cutters import Cutter
 from postproc.process.stock.engagement import engage
 from postproc.process.stock.motion_sweeps import find_sweeps
 from postproc.process.stock.stock_section import Edges, StockProcess
-from postproc.toolpath import Arcs, FrameRef, Kind, Toolpath
+from postproc.toolpath import Arcs, FrameRef, Kind
 
 MM = 1e-3
 KNOWN = Coefficients((700e6, 170e6, 200e6), (27e3, 26e3, 1e3))
@@ -43,7 +44,7 @@ def path_through(points, axes=None, kinds=None, arcs=None, tools=None, feed=FEED
     n = len(points)
     axes = np.broadcast_to([0.0, 0, 1], (n, 3)) if axes is None else np.array(axes, float)
     rotation = np.array([_upright(axis) for axis in axes])
-    return Toolpath(
+    return toolpath_of(
         kind=np.array([Kind.PTP] + [Kind.LIN] * (n - 1) if kinds is None else kinds),
         position=points,
         rotation=rotation,

@@ -260,7 +260,7 @@ def test_each_file_to_validate_with_has_its_figures(tmp_path):
         cells = text[k].split(",")
         text[k] = ",".join([*cells[:-1], f"{float(cells[-1]) + 2.0:.6f}"])
     bad.write_text("\n".join(text) + "\n")
-    request = IdentifyRequest((data,), None, ("joint_offset",), validate=(good, bad), bootstrap=0)
+    request = IdentifyRequest((data,), effects=("joint_offset",), validate=(good, bad), bootstrap=0)
     files = identify(request).as_json()["validation"]["files"]
     assert [file["file"] for file in files] == [str(good), str(bad)]
     assert [file["readings"] for file in files] == [8, 8]

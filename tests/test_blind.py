@@ -146,8 +146,16 @@ CLEAR = [
     case("single", "hysteresis", 5.0, 15),
     case("single", "joint_coupling", 5.0, 15),
 ]
-ALIKE = [case("single", "link_compliance", 5.0, 30, 1)]
-STRANGE = [case("outside", "leaning_stiffness", 5.0, 30)]
+ALIKE = [
+    case("single", "link_compliance", 5.0, 30, 1),
+    # waves of all gears do what weights, or a loop of hysteresis, and one wave do
+    *(cases.cases(row, number + 1, 8200)[number] for row, number in (("pair", 10), ("triple", 21))),
+]
+STRANGE = [
+    case("outside", "leaning_stiffness", 5.0, 30),
+    # waves of half an order whose sides of approach are free, a hose, and friction in proportion to load
+    *(cases.cases("outside", number + 1, 8200)[number] for number in (13, 18, 26)),
+]
 HOPELESS = [case("unidentifiable", "balancer_at_one_angle", 2.0, 15, number) for number in (0, 1)]
 
 

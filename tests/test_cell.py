@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from motions import toolpath_of
 
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import Poses
@@ -50,7 +51,7 @@ def refused(action) -> list[Finding]:
 def toolpath(base, tool, frames, position=None, kind=Kind.LIN) -> Toolpath:
     n = len(base)
     where = np.zeros((n, 3)) if position is None else np.asarray(position, float)
-    return Toolpath(
+    return toolpath_of(
         kind=np.full(n, kind),
         position=where,
         rotation=np.tile(np.eye(3), (n, 1, 1)),
@@ -90,7 +91,7 @@ def test_every_key_is_read_in_si(tmp_path):
     assert (cell.max_correction, cell.min_segment) == (pytest.approx(8e-3), pytest.approx(5e-4))
     assert cell.max_growth == 3
     assert (cell.controller.absolute_accuracy, cell.controller.gravity_compensated) == (True, False)
-    assert cell.integer_words == "um"
+    assert cell.dialect_options == {"integer_words": "um"}
 
 
 def test_defaults(tmp_path):
@@ -104,7 +105,7 @@ def test_defaults(tmp_path):
     assert cell.tolerance_angle == pytest.approx(np.radians(0.01))
     assert (cell.min_segment, cell.max_growth) == (pytest.approx(1e-3), 2.0)
     assert not cell.controller.absolute_accuracy
-    assert cell.integer_words == ""
+    assert cell.dialect_options == {}
     assert (cell.cycle_ms, cell.force_ramp, cell.temperature) == (12.0, None, None)
     assert (cell.force_ci95, cell.force_vector, cell.touch_points) == (None, None, {})
     assert cell.tools[1].diameter is None

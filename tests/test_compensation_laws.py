@@ -75,7 +75,7 @@ def test_what_is_left_is_what_the_robot_does_with_the_commands(said, gain):
     there = predict(
         job.model,
         result.command[rows],
-        LoadCase(TOOL, job.wrench[rows], NOTHING, job.track.status[rows], job.track.q[rows]),
+        LoadCase(TOOL, job.wrench[rows], NOTHING, job.track.branch[rows], job.track.q[rows]),
     ).pose
     wanted = job.wanted[rows]
     shift, turn = pose_error(there, wanted)
@@ -300,7 +300,7 @@ def test_a_motion_begins_where_the_one_before_ended_with_its_own_tool(tools):
         np.concatenate([frames[t].rotation for t in tools]),
         np.concatenate([frames[t].position for t in tools]),
     )
-    path = replace(job.toolpath, tool=np.array(tools))
+    path = job.toolpath.with_columns(tool=np.array(tools))
     begin = start_poses(job.wanted, path, tool, job.model.robot, job.track)[np.arange(4)]
     for row in range(1, 4):
         flange = job.wanted[row - 1 : row] @ tool[row - 1 : row].inverse()
@@ -364,7 +364,7 @@ def test_a_posture_that_becomes_singular_is_told_at_its_line():
     q = np.radians([[a1, -60.0, 90.0, 0.0, 0.0, 0.0] for a1 in (-1.0, -1.0, 0.0, 0.0)])
     q[:, 4] = np.arcsin(0.02) + 1e-5
     wanted = job.model.chain.flange(q) @ job.tool[0:1]
-    path = replace(job.toolpath, position=wanted.position, rotation=wanted.rotation)
+    path = job.toolpath.with_columns(position=wanted.position, rotation=wanted.rotation)
     track = follow_axes(job.model.robot, path, wanted @ job.tool[0:1].inverse(), q[0])
     lines = []
     for sense in (1, -1):
@@ -388,7 +388,7 @@ def test_a_correction_begins_anew_behind_another_tool(tools):
     """Whichever of the two has the larger number; nothing else changes between the two motions in air."""
     task = line()
     path = task.toolpath
-    path = replace(path, tool=np.array([tools[0], *[tools[1]] * (len(path) - 1)]), frames=path.frames * 2)
+    path = path.with_columns(tool=np.array([tools[0], *[tools[1]] * (len(path) - 1)]), frames=path.frames * 2)
     every = np.ones(len(path), bool)
     assert replace(task, toolpath=path).steps(np.array([1]), every)[0] == (tools[0] != tools[1])
 

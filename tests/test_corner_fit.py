@@ -191,7 +191,7 @@ def test_a_corner_stays_as_it_was(why: str) -> None:
     if why == "gain":
         job = replace(job, gain=0.5)
     elif why == "unknown":
-        job = replace(job, toolpath=replace(job.toolpath, approximation=np.full(4, np.nan)))
+        job = replace(job, toolpath=job.toolpath.with_columns(approximation=np.full(4, np.nan)))
     elif why == "good":
         job = replace(job, tolerance=1e-3)
     result = correct(job)

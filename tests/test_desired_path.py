@@ -49,7 +49,7 @@ def every(kinds, tools=None, axes=None, lost=(), turnless=(), arcs=None, seed=3,
     target = Poses(rotation, position)
     path = motions(target, np.array(kinds), arcs=Arcs(centre, normal, sweep))
     chosen = np.zeros(n, int) if tools is None else np.array(tools)
-    path = replace(path, tool=chosen)
+    path = path.with_columns(tool=chosen)
     tool = Poses(*(np.stack([getattr(TOOLS[t], name) for t in chosen]) for name in ("rotation", "position")))
     q = np.full((n, 6), NAN)
     for row, values in (axes or {}).items():
@@ -129,7 +129,7 @@ def test_where_the_motion_before_is_not_known_a_motion_begins_nowhere():
     np.testing.assert_array_equal(begin[order].position, begin[:].position[order])
     # the axes of the first motion do not make it begin there
     first = replace(track, q=np.tile(AXES, (len(path), 1)))
-    unknown = replace(path, tool=np.full(len(path), -1))
+    unknown = path.with_columns(tool=np.full(len(path), -1))
     assert np.isnan(start_poses(wanted, unknown, tool, kr270(), first)[[0]].position).all()
     # axes of which some are not known bring the tool nowhere
     q = np.array(track.q)

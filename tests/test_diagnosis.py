@@ -21,7 +21,7 @@ from postproc.diagnosis.diagnosis import diagnose
 from postproc.diagnosis.nonlinear_effects import broyden_update, evaluate_at_size
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
 from postproc.diagnosis.search import SHARED, drop_confounded, limit_shared_scatter, model_unknowns, search
-from postproc.diagnosis.selection import complexity_penalty, counts, explained, problem
+from postproc.diagnosis.selection import complexity_penalty, counts, explained, problem, selected
 from postproc.diagnosis.verdict import (
     BUILT,
     MARGIN,
@@ -394,6 +394,19 @@ def test_what_is_worth_a_name(count, size, far, named):
     without, with_ = explained(given, ()), explained(given, (0,))
     assert without.squares - with_.squares > 20.0
     assert counts(given, without, with_, 30) == named
+
+
+def test_two_effects_are_no_third_of_many_columns():
+    """Ten columns that hold what two effects of one column do explain the most by themselves; two need fewer."""
+    rng = np.random.default_rng(5)
+    two = rng.normal(size=(300, 2))
+    others = two @ rng.normal(size=(2, 2)) + 0.05 * rng.normal(size=(300, 2))
+    many = np.concatenate([others, rng.normal(size=(300, 8))], axis=1)
+    residual = two @ [1.0, 1.0] + rng.normal(size=300)
+    groups = [(part, np.tile([-1e9, 1e9], (part.shape[1], 1))) for part in (many, two[:, :1], two[:, 1:])]
+    given = problem(residual, np.zeros((300, 0)), groups, 300, True)
+    assert explained(given, (0,)).squares < min(explained(given, (g,)).squares for g in (1, 2))
+    assert sorted(selected(given, range(3)).groups) == [1, 2]
 
 
 def test_of_two_forms_with_the_same_parameters_one_stays():

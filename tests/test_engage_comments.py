@@ -18,11 +18,10 @@ FLAT16 = "(T1  D=16. CR=0. - ZMIN=-5. - flat end mill)\n"
 
 
 def read(*texts, lowest=-5.0):
-    from dataclasses import replace
 
     path = path_through([[0, 0, 5], [0, 0, lowest], [50, 0, lowest]])
     comments = tuple(Annotation(0, text, 1 + line) for line, text in enumerate(texts))
-    return read_tool_comments(replace(path, comments=comments))
+    return read_tool_comments(path.with_columns(comments=comments))
 
 
 @pytest.mark.parametrize(

@@ -118,7 +118,7 @@ def drawn(task, command, names, root, force=0.0, seed=11):
     still, tool = np.zeros_like(task.wrench), tiled(task.tool, 3)
 
     def motors(pose):
-        return predict(task.model, pose, LoadCase(task.tool, still, NOTHING, track.status, track.q)).q
+        return predict(task.model, pose, LoadCase(task.tool, still, NOTHING, track.branch, track.q)).q
 
     q = np.concatenate([motors(task.wanted), motors(command), motors(task.wanted)])
     near = task.model.equilibrium(q, np.tile(task.wrench, (3, 1)), tool).displacement
@@ -147,7 +147,7 @@ def covariance_of(errors):
 
 
 def _real(task, model, command, wrench):
-    there = predict(model, command, LoadCase(task.tool, wrench, NOTHING, task.track.status, task.track.q))
+    there = predict(model, command, LoadCase(task.tool, wrench, NOTHING, task.track.branch, task.track.q))
     assert there.settled.all()
     return there.pose.position
 

@@ -563,7 +563,7 @@ def test_any_arm_on_a_rail_is_followed(tmp_path):
     lost = follow_axes(
         arm, motions(target, external=np.where(external == e1[7], np.inf, external)), target, q[0]
     )
-    assert lost.status[6:9].tolist() == [0, -1, 0]
+    assert lost.branch[6:9].tolist() == [0, -1, 0]
 
 
 def edited(source, old, new):

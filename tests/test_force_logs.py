@@ -1,6 +1,5 @@
 """Measured forces over path length or time, brought to the motions, and what they refuse."""
 
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -64,7 +63,7 @@ def test_a_force_linear_in_the_path_length_is_found_again(tmp_path):
 
 
 def test_time_runs_at_the_programmed_feed(tmp_path):
-    path = replace(STRAIGHT, feed=np.array([np.nan, 0.02, 0.1, 0.01]))  # 5, 2 and 5 s
+    path = STRAIGHT.with_columns(feed=np.array([np.nan, 0.02, 0.1, 0.01]))  # 5, 2 and 5 s
     t = np.linspace(0, 12, 241)
     result = run(path, log(tmp_path, t, 10 * t + 100, "t_s"))
     assert np.allclose(result.values[1:, 0], [150, 170, 220], atol=1e-6)
@@ -257,7 +256,7 @@ def test_a_gap_in_air_is_none(tmp_path):
 
 @pytest.mark.parametrize("column", ["s_mm", "t_s"])
 def test_a_log_that_is_too_short_is_refused(tmp_path, column):
-    path = replace(STRAIGHT, feed=np.full(4, 0.001))  # 1 mm/s: both scales count alike
+    path = STRAIGHT.with_columns(feed=np.full(4, 0.001))  # 1 mm/s: both scales count alike
     spec = log(tmp_path, S[:300], S[:300], column)
     (finding,) = refused(path, spec)
     assert (finding.code, finding.file, finding.line) == ("FRC019", spec, 301)
@@ -277,7 +276,7 @@ def test_a_log_that_goes_on_is_told(tmp_path):
 
 
 def test_without_a_feed_there_is_no_time(tmp_path):
-    path = replace(STRAIGHT, feed=np.array([np.nan, 0.02, np.nan, 0.0]))
+    path = STRAIGHT.with_columns(feed=np.array([np.nan, 0.02, np.nan, 0.0]))
     (finding,) = refused(path, log(tmp_path, S, S, "t_s"))
     assert (finding.code, finding.file, finding.line) == ("FRC013", "part.src", 12)
     assert "the feed of 2 motions is not known" in finding.message

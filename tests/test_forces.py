@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from motions import toolpath_of
 from tiers import examples
 
 from postproc.base.findings import Finding, Refusal
@@ -22,7 +23,7 @@ HORIZONTAL = [[0, 0, 0], [0.1, 0, 0], [0.2, 0, 0]]
 def path_of(points, kinds=None, rotations=None, notes=(), frames=FRAMES, base=None, tool=None) -> Toolpath:
     """Motions to ``points`` [m] with the tool down; lines count 10, 11, ...; NaN makes a target unknown."""
     n = len(points)
-    return Toolpath(
+    return toolpath_of(
         kind=np.full(n, Kind.LIN) if kinds is None else np.array(kinds),
         position=np.array(points, float).reshape(n, 3),
         rotation=np.tile(DOWN, (n, 1, 1)) if rotations is None else np.array(rotations),
@@ -635,7 +636,7 @@ def test_many_lines_without_motion_are_told_briefly(tmp_path):
 def test_between_two_motions_both_are_named(tmp_path):
     path = csv(tmp_path, "line,fx,fy,fz\n15,1,2,3\n")
     motions = path_of(AWAY)
-    spread = Toolpath(**{**vars(motions), "line": np.array([10, 14, 18, 20])})
+    spread = motions.with_columns(line=np.array([10, 14, 18, 20]))
     assert "the nearest motions are in line 14 and 18" in refused(spread, str(path))[0].message
 
 
@@ -687,7 +688,7 @@ def test_a_cut_without_any_known_place_keeps_its_force(tmp_path):
     """Nothing of the path is known, so no motion begins anywhere; the force is still there to be seen."""
     n = 3
     unknown = np.full((n, 3), np.nan)
-    path = Toolpath(
+    path = toolpath_of(
         kind=np.full(n, Kind.LIN),
         position=unknown,
         rotation=np.full((n, 3, 3), np.nan),

@@ -105,8 +105,7 @@ def repeated(path: Toolpath, times: int) -> Toolpath:
             "stops",
         )
     }
-    return replace(
-        path,
+    return path.with_columns(
         **tiled,
         **left_out,
         line=np.arange(n * times) + 10,
@@ -147,7 +146,7 @@ def test_a_repeated_path_has_the_forces_of_the_path(seed, count, spec):
             (7, "FORCE OFF"),
             (8, "FORCE 90 0 5"),
         )
-        path = replace(path, annotations=tuple(Annotation(row, text, 9) for row, text in notes))
+        path = path.with_columns(annotations=tuple(Annotation(row, text, 9) for row, text in notes))
     try:
         short = run(path, spec, CELL)
     except Refusal as refusal:  # a cut along the spindle has no feed frame
@@ -211,7 +210,7 @@ def test_a_process_over_a_repeated_path(tmp_path):
     points[4] = [*points[3][:2], -0.02]
     kinds = [Kind.PTP] + [Kind.LIN] * 6 + [Kind.PTP] + [Kind.LIN] * 5
     path = path_of(points, kinds, frames=FRAMES, tool=[1] * 7 + [2] * 6)
-    path = replace(path, feed=np.linspace(0.01, 0.02, 13)[[0, 1, 2, 2, 4, 5, 6, 7, 3, 9, 1, 11, 12]])
+    path = path.with_columns(feed=np.linspace(0.01, 0.02, 13)[[0, 1, 2, 2, 4, 5, 6, 7, 3, 9, 1, 11, 12]])
     process = tmp_path / "process.yaml"
     process.write_text(
         "defaults: {teeth: 3, helix: 30, axial_depth: 5, radial_width: 8, direction: down, spindle: 12000,\n"

@@ -45,7 +45,9 @@ def dialect_of(path: Path):
 
 
 def settings_of(path: Path) -> ReadingSettings:
-    return ReadingSettings(orientation=DOWN.orientation, integer_words="um" if "_um" in path.stem else "mm")
+    return ReadingSettings(
+        orientation=DOWN.orientation, options={"integer_words": "um" if "_um" in path.stem else "mm"}
+    )
 
 
 def program(path: Path) -> Program:
@@ -273,7 +275,7 @@ def test_angles_change_where_others_are_nearer(words: str, share: float) -> None
 @pytest.mark.parametrize(("unit", "whole"), [("G21", "X1000 Y-2500"), ("G20", "X10000 Y-25000")])
 def test_shifts_count_increments_too(code: str, unit: str, whole: str) -> None:
     """A control that takes X1000 for a millimetre does so wherever it says a length."""
-    micro = ReadingSettings(orientation=DOWN.orientation, integer_words="um")
+    micro = ReadingSettings(orientation=DOWN.orientation, options={"integer_words": "um"})
     ends = []
     for said in (whole, "X1. Y-2.5"):
         text = f"{unit} G90 G17 G54 T1\nG0 X0. Y0. Z0.\n{code} {said}\nG1 X4. Y5. Z6. F100\n"

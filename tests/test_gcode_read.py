@@ -32,7 +32,7 @@ def read(
     text: str | bytes, dialect: str = "linuxcnc", orientation: np.ndarray | None = DOWN, integers: str = "mm"
 ) -> Program:
     raw = text if isinstance(text, bytes) else text.encode("latin-1")
-    settings = ReadingSettings(orientation=orientation, integer_words=integers)
+    settings = ReadingSettings(orientation=orientation, options={"integer_words": integers})
     return DIALECTS[dialect].read((Document(Path("part.nc"), raw),), settings)
 
 

@@ -33,7 +33,7 @@ def read(head: str, text: str) -> Program:
     name, *words = head.split()
     orientation = None if "unoriented" in words else DOWN
     integers = next((word for word in ("um", "undecided") if word in words), "mm").replace("undecided", "")
-    settings = ReadingSettings(orientation=orientation, integer_words=integers)
+    settings = ReadingSettings(orientation=orientation, options={"integer_words": integers})
     return NAMES[name].read((Document(Path("part.nc"), text.encode("latin-1")),), settings)
 
 

@@ -38,7 +38,7 @@ def dialect_of(path: Path):
 
 def settings_of(path: Path) -> ReadingSettings:
     words = "um" if "_um" in path.stem else "mm"
-    return ReadingSettings(orientation=DOWN.orientation, integer_words=words)
+    return ReadingSettings(orientation=DOWN.orientation, options={"integer_words": words})
 
 
 @pytest.mark.sample(21)
@@ -149,7 +149,7 @@ def test_increments_do_not_add_up_their_rounding() -> None:
 
 
 def test_integer_words_of_a_control_that_counts_get_a_point() -> None:
-    count = ReadingSettings(orientation=DOWN.orientation, integer_words="um")
+    count = ReadingSettings(orientation=DOWN.orientation, options={"integer_words": "um"})
     program = read(FANUC, "O1\nG21 G90 G54\nT1 M6\nG0 X0 Y0 Z0\nG1 X1000 Y2.5 Z-500 F100\n", count)
     plan = Plan.of(program.toolpath)
     position = plan.position.copy()

@@ -25,7 +25,7 @@ HEADS = {
     "sinumerik": "G54 G71 G90 G17\nT1 D1\nG0 X0 Y0 Z5\n",
     "kuka_cnc": "G54 G71 G90 G17\nT1\nG0 X0 Y0 Z5 A0 B0 C180\n",
 }
-UM = ReadingSettings(orientation=DOWN.orientation, integer_words="um")
+UM = ReadingSettings(orientation=DOWN.orientation, options={"integer_words": "um"})
 
 
 def plan_of(program: Program, steps: str) -> Plan:

@@ -155,7 +155,7 @@ def densely(robot, track, target, tool, count=2000):
     for share in np.linspace(0, 1, count + 1)[1:]:
         rotation = rotation_from_vector(share * turn) @ begin.rotation
         position = begin.position + share * (end.position - begin.position)
-        q = inverse(robot.nominal, Poses(rotation, position) @ tool.inverse(), track.status[[1]], q).q
+        q = inverse(robot.nominal, Poses(rotation, position) @ tool.inverse(), track.branch[[1]], q).q
     return q[0]
 
 
@@ -302,7 +302,7 @@ def test_a_cut_that_turns_by_half_a_turn_is_corrected_in_parts():
     task = task_to(points, [False, False, True, False], tolerance=0.5e-3)
     rotation = task.toolpath.rotation.copy()
     rotation[2:] = rotation[2:] @ rotation_from_vector(np.array([0.0, 0.0, math.pi]))
-    path = replace(task.toolpath, rotation=rotation)
+    path = task.toolpath.with_columns(rotation=rotation)
     wanted = Poses(rotation, task.wanted.position)
     flange = wanted @ task.tool.inverse()
     track = follow_axes(

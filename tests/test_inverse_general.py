@@ -17,10 +17,10 @@ from postproc.robot import newton
 from postproc.robot.axis_track import follow_axes, is_near_singular, nominal_flange, singular_words
 from postproc.robot.description import find_robot, load_robot
 from postproc.robot.geometries import SerialArm
-from postproc.robot.inverse import inverse, status_of
+from postproc.robot.inverse import branch_of, inverse
 from postproc.robot.newton import FAR, TOLERANCE, solver_of
-from postproc.robot.stated_branches import sides
-from postproc.toolpath import Kind
+from postproc.robot.stated_branches import stated_changes
+from postproc.toolpath import Configuration, Kind
 
 DEG = math.pi / 180
 
@@ -136,7 +136,7 @@ def test_closed_form_and_newton_are_one(on_rail):
     pose = nominal_flange(on_rail, q)
     near = q + np.random.default_rng(1).uniform(-0.02, 0.02, q.shape)
     near[:, 0] = q[:, 0]
-    closed = inverse(on_rail.nominal, pose, status_of(on_rail.nominal, q), near)
+    closed = inverse(on_rail.nominal, pose, branch_of(on_rail.nominal, q), near)
     general = as_general(on_rail)
     assert np.abs(nominal_flange(general, q).position - pose.position).max() < 1e-13
     numeric = inverse(general.nominal, pose, np.zeros(1000, int), near)
@@ -262,8 +262,9 @@ def test_singular_words_name_the_joint(on_rail):
 
 def test_no_s_and_t(ur5):
     q = states(ur5, 10)
-    assert status_of(ur5.nominal, q).tolist() == [0] * 10
-    assert [side.tolist() for side in sides(ur5, q)] == [[0] * 10] * 2
+    assert branch_of(ur5.nominal, q).tolist() == [0] * 10
+    turned = stated_changes(ur5, Configuration({"turn": np.zeros(10)}).for_motions(10), q, -q)
+    assert not turned.crossed.any()
 
 
 # along a program
@@ -288,7 +289,7 @@ def test_path_is_followed_as_if_motion_by_motion(ur5, count):
     track = follow_axes(ur5, motions(target), target, START)
     assert track.reachable.all()
     assert track.turn_matches.all()
-    assert track.status.tolist() == [0] * count
+    assert track.branch.tolist() == [0] * count
     assert left_over(ur5, track.q, target) < 1e-12
     solver, q = solver_of(ur5.nominal), START[None]
     for row in range(count):
@@ -342,7 +343,7 @@ def test_axis_motion_sets_where_it_goes_on(ur5):
     assert np.abs(track.q - q).max() < 1e-8
     # nothing before the axis motion is known without a start
     track = follow_axes(ur5, motions(target, axes={3: q[3]}), target, None)
-    assert track.status.tolist() == [-1, -1, -1, 0, 0, 0]
+    assert track.branch.tolist() == [-1, -1, -1, 0, 0, 0]
     assert np.isnan(track.q[:3]).all()
     assert track.reachable.all()
     assert np.abs(track.q[3:] - q[3:]).max() < 1e-8
@@ -357,7 +358,7 @@ def test_home_is_where_the_program_starts(ur5):
     for code, status in (("KRL016", 0), ("KRL003", -1)):
         words = {"kind": kinds, "axes": {1: other}, "refused": {3: Finding(code, "HOME")}}
         track = follow_axes(ur5, motions(lost, **words), lost, START)
-        assert track.status.tolist() == [0, 0, 0, status, status, status]
+        assert track.branch.tolist() == [0, 0, 0, status, status, status]
         assert np.isfinite(track.q[4]).all() == (status == 0)
         assert np.sign(track.q[:3, 4]).tolist() == [-1, 1, 1]
         if status == 0:
@@ -372,7 +373,7 @@ def test_s_of_a_ptp_says_nothing_here(ur5):
     lost = Poses(target.rotation.copy(), target.position.copy())
     lost.rotation[1], lost.position[1] = np.nan, np.nan
     track = follow_axes(ur5, motions(lost, **words, status=6, turn=5), lost, START)
-    assert track.status.tolist() == [0, -1, -1, -1]
+    assert track.branch.tolist() == [0, -1, -1, -1]
     assert np.isnan(track.q[1:]).all()
     track = follow_axes(ur5, motions(target, kind=Kind.PTP, status=6, turn=5), target, START)
     assert np.abs(track.q - follow_axes(ur5, motions(target), target, START).q).max() < 1e-12
@@ -536,7 +537,7 @@ def test_axis_motion_of_seven_joints_states_six(seven):
     track = follow_axes(seven, motions(target, axes={1: six}), target, start)
     assert np.abs(track.q - q).max() < 1e-9
     track = follow_axes(seven, motions(target, axes={1: six}), target, None)
-    assert track.status.tolist() == [-1] * 3
+    assert track.branch.tolist() == [-1] * 3
     assert np.isnan(track.q).all()
 
 
@@ -553,12 +554,12 @@ def test_kuka_on_its_rail_is_followed(on_rail):
     theirs = follow_axes(floor, motions(target, **words), target, q[0])
     assert np.abs(ours.q[:, 1:] - theirs.q).max() < 1e-12
     assert ours.q[:, 0].tolist() == [2.5] * 5
-    for name in ("status", "reachable", "within", "turn_matches"):
+    for name in ("branch", "reachable", "within", "turn_matches"):
         assert np.array_equal(getattr(ours, name), getattr(theirs, name))
-    assert np.array_equal(sides(on_rail, ours.q), sides(floor, theirs.q))
+    assert np.array_equal(branch_of(on_rail.nominal, ours.q), branch_of(floor.nominal, theirs.q))
     assert np.array_equal(is_near_singular(on_rail, ours.q), is_near_singular(floor, theirs.q))
     lost = follow_axes(on_rail, motions(moved, **words), moved, None)
-    assert lost.status.tolist() == [-1] * 5
+    assert lost.branch.tolist() == [-1] * 5
 
 
 def test_straight_wrist_of_an_arm_that_counts_otherwise():
@@ -601,10 +602,10 @@ def test_mirror_on_a_general_arm(tmp_path):
     track = follow_axes(robot, motions(wanted), wanted, START)
     tool = Poses.identity()
     wrench = np.tile([30.0, -20, 60, 0.5, 0.2, 0.1], (200, 1))
-    done = mirror(model, wanted, wanted, LoadCase(tool, wrench, Conditions(), track.status, track.q))
+    done = mirror(model, wanted, wanted, LoadCase(tool, wrench, Conditions(), track.branch, track.q))
     assert done.converged.all()
     assert np.nanmin(done.history[0]) > 2e-4
-    real = predict(model, done.command, LoadCase(tool, wrench, Conditions(), track.status, track.q))
+    real = predict(model, done.command, LoadCase(tool, wrench, Conditions(), track.branch, track.q))
     shift, turn = pose_error(real.pose, wanted)
     assert np.linalg.norm(shift, axis=1).max() < 1e-8
     assert np.linalg.norm(turn, axis=1).max() < 1e-8

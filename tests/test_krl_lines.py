@@ -115,7 +115,7 @@ def test_lines_of_a_file(raw: bytes, expected: list[tuple[int, int, int]]) -> No
         (b"DEF a b", "other", b"DEF", None), (b"END", "end", b"END", None), (b"ENDFCT (x)", "end", b"ENDFCT", None),
         (b"GOTO  on ", "goto", b"GOTO", b"ON"), (b"GOTO 5", "other", b"GOTO", None),
         (b"exit", "exit", b"EXIT", None), (b"RETURN x", "return", b"RETURN", None),
-        (b"WAIT SEC 1", "kept", b"WAIT", None), (b"HALT", "kept", b"HALT", None),
+        (b"WAIT SEC 1", "system", b"WAIT", None), (b"HALT", "system", b"HALT", None),
         (b"GLOBAL INTERRUPT DECL 3 WHEN x DO y()", "other", b"GLOBAL", None),
         (b"x = 5", "assignment", b"X", Assignment(b"X", None, b"", b"5", 4)),
         (b"P[ 2 ].f . x=-5 ", "assignment", b"P", Assignment(b"P", b" 2 ", b"F.X", b"-5", 13)),
@@ -127,10 +127,10 @@ def test_lines_of_a_file(raw: bytes, expected: list[tuple[int, int, int]]) -> No
         (b"on :", "label", b"ON", b"ON"), (b"5", "other", b"", None), (b"REAL", "other", b"REAL", None),
         (b"INT a", "declaration", b"INT", Declared(b"INT", False, ((b"A", b"", 5),))),
         (b"REAL=5", "assignment", b"REAL", Assignment(b"REAL", None, b"", b"5", 5)),
-        (b"Z\xe4hler=1", "foreign", b"Z", Assignment(b"Z_HLER", None, b"", b"1", 7)),
-        (b"\xd6ffnen(1)", "foreign", b"", Call(b"_FFNEN", b"1")),
-        (b"GOTO \xf6l", "strange", b"GOTO", None), (b"a\xf6", "strange", b"A", None),
-        (b"x\xe5=1", "strange", b"X", None),
+        (b"Z\xe4hler=1", "umlaut_name", b"Z", Assignment(b"Z_HLER", None, b"", b"1", 7)),
+        (b"\xd6ffnen(1)", "umlaut_name", b"", Call(b"_FFNEN", b"1")),
+        (b"GOTO \xf6l", "unreadable", b"GOTO", None), (b"a\xf6", "unreadable", b"A", None),
+        (b"x\xe5=1", "unreadable", b"X", None),
         (b'x="\xe5"', "assignment", b"X", Assignment(b"X", None, b"", b'"\xe5"', 2)),
     ],
 )  # fmt: skip
@@ -146,16 +146,16 @@ def test_a_statement_stands_behind_its_blanks() -> None:
     assert statement(b" ; c\n", 1, 0, 5) == Statement("comment", b"", b"", 1, 1, None, b"; c")
     assert statement(b" \t\n", 1, 0, 3) is None
     assert statement(b"&ACCESS x\n", 1, 0, 10) == Statement("header", b"&", b"&ACCESS x", 1, 0)
-    strange = statement(b"1\xe5" + b" " * 5 + b";\xe5", 1, 0, 9)
-    assert strange is not None
-    assert (strange.kind, strange.code) == ("strange", b"1\xe5")
+    unreadable = statement(b"1\xe5" + b" " * 5 + b";\xe5", 1, 0, 9)
+    assert unreadable is not None
+    assert (unreadable.kind, unreadable.code) == ("unreadable", b"1\xe5")
 
 
 def test_lines_that_are_too_long_are_none_of_krl() -> None:
     for count, kind in (LONGEST, "assignment"), (LONGEST + 1, "other"):
         assert stated(b"x=" + b"1" * (count - 2)).kind == kind
     assert stated(b"LIN " + b"1" * LONGEST).kind == "motion"
-    for count, kind in (LONGEST, "foreign"), (LONGEST + 1, "strange"):
+    for count, kind in (LONGEST, "umlaut_name"), (LONGEST + 1, "unreadable"):
         assert stated(b"\xe4=" + b"1" * (count - 2)).kind == kind
 
 

@@ -252,11 +252,6 @@ def test_an_inline_form_is_whole_where_it_sets_other_frames() -> None:
     text = "".join(FORM.format(n=n, v=v, m=FULL) for n, v in ((1, 0.5), (1, 0.2), (2, 0.2), (2, 0.2)))
     program = body(text + FULL)
     assert list(program.toolpath.constraints.no_insert_before) == [2]
-    raw = program.documents[0].raw
-    assert sorted(program.text.inline) == [0, 1, 2, 3]
-    for row, form in program.text.inline.items():
-        assert raw[form.at :].startswith(b";FOLD LIN P1")
-        np.testing.assert_equal(form.feed, [np.nan, 0.5, 0.2, 0.2][row])
 
 
 def test_comments_on_lines_of_their_own_are_kept_once() -> None:

@@ -175,10 +175,6 @@ def places(program: Program) -> Iterator[str]:
             said = "-" if reference is None else span(program, 0, reference.start, reference.stop)
             said += " in tool" * found.in_tool
             out.append(f"relative {span(program, 0, found.word.start, found.word.stop)} {said}")
-        if row in text.inline:
-            line_of, column = program.documents[0].place(text.inline[row].at)
-            assert column == 1
-            out.append(f"form of line {line_of} {text.inline[row].feed:g}")
         yield "; ".join(out)
 
 

@@ -292,7 +292,7 @@ def test_rows_are_taken_out_from_any_on() -> None:
                 rows.add(row(at), None)
             for sparse in (
                 rows.anchors, rows.reasons, rows.variables, rows.locked, rows.arcs, rows.relative,
-                rows.no_insert_before, rows.inline, rows.approximated, rows.builds_on,
+                rows.no_insert_before, rows.approximated, rows.builds_on,
             ):  # fmt: skip
                 if at < stop and at % 2:
                     sparse[at] = at  # type: ignore[index, assignment]

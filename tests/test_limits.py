@@ -66,7 +66,7 @@ def test_axes_that_are_too_slow_for_the_feed():
     found, _ = judged(slow)
     assert [finding.code for finding in found] == ["KIN009"]
     assert "its speed limit is 0.5 deg/s" in found[0].message
-    quick = replace(task, toolpath=replace(task.toolpath, feed=np.full(4, 1e-3)))
+    quick = replace(task, toolpath=task.toolpath.with_columns(feed=np.full(4, 1e-3)))
     quick = replace(quick, model=slow.model)
     assert codes(quick)[0] == []
 
@@ -78,7 +78,7 @@ def test_the_motion_that_is_too_fast_is_the_one_that_is_told():
     axes = tuple(replace(axis, speed=np.radians(0.5)) for axis in robot.axes)
     feed = np.where(np.arange(len(path)) == 3, 0.1, 1e-5)
     slow = replace(task, model=replace(task.model, robot=replace(robot, axes=axes)))
-    slow = replace(slow, toolpath=replace(path, feed=feed))
+    slow = replace(slow, toolpath=path.with_columns(feed=feed))
     result = correct(slow)
     found, _ = check_limits(slow, subdivide(slow, result, Limits(no_insert=True)))
     assert [(finding.code, finding.line) for finding in found] == [("KIN009", path.line[3])]
@@ -91,7 +91,7 @@ def test_a_posture_that_only_the_correction_makes_singular():
     q = np.radians([[a1, -60.0, 90.0, 0.0, 0.0, 0.0] for a1 in (-1.0, -1.0, 0.0, 0.0)])
     q[:, 4] = np.arcsin(0.02) + 1e-5
     wanted = model.chain.flange(q) @ TOOL
-    path = replace(task.toolpath, position=wanted.position, rotation=wanted.rotation)
+    path = task.toolpath.with_columns(position=wanted.position, rotation=wanted.rotation)
     track = follow_axes(model.robot, path, wanted @ TOOL.inverse(), START)
     assert not is_near_singular(model.robot, track.q).any()
     found = {}

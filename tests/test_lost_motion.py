@@ -30,7 +30,7 @@ def axes_along(job, count=4000):
     rows = np.repeat(np.flatnonzero(job.desired_path.traceable), count)
     along = np.tile(np.arange(1, count + 1) / count, len(rows) // count)
     flange = job.desired_path.at(rows, along) @ job.tool[rows].inverse()
-    return rows, along, inverse(job.model.robot.nominal, flange, job.track.status[rows], job.track.q[rows]).q
+    return rows, along, inverse(job.model.robot.nominal, flange, job.track.branch[rows], job.track.q[rows]).q
 
 
 def lagging(axes, gap, begin):

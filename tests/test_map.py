@@ -20,7 +20,7 @@ from postproc.model import StiffnessModel
 from postproc.placement.workspace_map import MapLoad, WorkspaceGrid, evaluate_workspace, with_sign
 from postproc.report import picture
 from postproc.robot.description import find_robot, load_robot
-from postproc.robot.inverse import status_of
+from postproc.robot.inverse import branch_of
 from postproc.workflows.map import MapRequest, map_workspace
 
 SAMPLE = Path(__file__).resolve().parent.parent / "samples" / "kr270_paper"
@@ -210,10 +210,10 @@ def test_status_is_the_branch(status):
     found = evaluate_workspace(
         model,
         WorkspaceGrid(np.linspace(0.6, 1.6, 5), np.array([0.3]), np.linspace(0.4, 1.6, 5)),
-        load(status=status, ignore_limits=True),
+        load(branch=status, ignore_limits=True),
     )
     assert found.mapped.any()
-    assert (status_of(model.robot.nominal, found.q[found.mapped]) == status).all()
+    assert (branch_of(model.robot.nominal, found.q[found.mapped]) == status).all()
     low, high = model.robot.limits.T
     inside = ((found.q >= low) & (found.q <= high)).all(axis=1)
     assert np.array_equal(inside, found.within)

@@ -19,7 +19,7 @@ from postproc.model import NOTHING, StiffnessModel
 from postproc.process import Wrenches
 from postproc.robot.axis_track import follow_axes
 from postproc.robot.chain import generalized_force
-from postproc.robot.inverse import inverse, status_of
+from postproc.robot.inverse import branch_of, inverse
 from postproc.toolpath import Annotation, Kind
 
 TOOL = Poses(rotation_from_vector([0.0, 0.5, 0.0]), np.array([0.12, 0.0, 0.25]))
@@ -50,18 +50,18 @@ class Problem:
         self.model, self.near = model, milling_angles(count, rng)
         self.tool, self.wrench = random_tools(count, rng), random_wrenches(count, rng)
         self.wanted = model.chain.flange(self.near) @ self.tool
-        self.status = status_of(model.robot.nominal, self.near)
+        self.branch = branch_of(model.robot.nominal, self.near)
 
     def mirror(self):
         return mirror(
             self.model,
             self.wanted,
             self.wanted,
-            LoadCase(self.tool, self.wrench, NOTHING, self.status, self.near),
+            LoadCase(self.tool, self.wrench, NOTHING, self.branch, self.near),
         )
 
     def predict(self, command):
-        return predict(self.model, command, LoadCase(self.tool, self.wrench, NOTHING, self.status, self.near))
+        return predict(self.model, command, LoadCase(self.tool, self.wrench, NOTHING, self.branch, self.near))
 
 
 def stepped(command, shift, turn):
@@ -110,7 +110,7 @@ def test_one_motion_is_corrected_as_in_the_batch():
             problem.wanted[rows],
             problem.wanted[rows],
             LoadCase(
-                problem.tool[rows], problem.wrench[rows], NOTHING, problem.status[rows], problem.near[rows]
+                problem.tool[rows], problem.wrench[rows], NOTHING, problem.branch[rows], problem.near[rows]
             ),
         )
         assert np.abs(alone.command.position - done.command.position[rows]).max() < 1e-12
@@ -169,7 +169,7 @@ def test_rate_grows_with_the_compliance():
 
 def inverse_of(problem, goal):
     flange = goal @ problem.tool.inverse()
-    return inverse(problem.model.robot.nominal, flange, problem.status, problem.near).q
+    return inverse(problem.model.robot.nominal, flange, problem.branch, problem.near).q
 
 
 def motor_angles(model, goal_angles, tool, wrench):
@@ -355,7 +355,7 @@ def test_cuts_are_corrected_and_air_is_not_touched():
     rest = predict(
         job.model,
         result.command[job_rows],
-        LoadCase(TOOL, job.wrench[job_rows], NOTHING, job.track.status[job_rows], job.track.q[job_rows]),
+        LoadCase(TOOL, job.wrench[job_rows], NOTHING, job.track.branch[job_rows], job.track.q[job_rows]),
     )
     assert np.linalg.norm(rest.pose.position - job.wanted.position[job_rows], axis=1).max() <= NANOMETRES_10
 
@@ -581,7 +581,7 @@ def test_process_keeps_the_sag_and_absolute_removes_it():
 
     def real(job, command, wrench):
         return predict(
-            model, command, LoadCase(job.tool, wrench, NOTHING, job.track.status, job.track.q)
+            model, command, LoadCase(job.tool, wrench, NOTHING, job.track.branch, job.track.q)
         ).pose
 
     sagged = real(process, process.wanted, still)

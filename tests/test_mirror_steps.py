@@ -13,7 +13,7 @@ from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import MAX_ITERATIONS, interpolate_pose, mirror
 from postproc.model import NOTHING
-from postproc.robot.inverse import status_of
+from postproc.robot.inverse import branch_of
 
 DONE = 1e-8
 
@@ -27,7 +27,7 @@ class Off:
         self.robot = kr270()
         self.near = milling_angles(count, rng)
         self.tool = random_tools(count, rng)
-        self.status = status_of(self.robot.nominal, self.near)
+        self.branch = branch_of(self.robot.nominal, self.near)
         self.wanted = self.robot.nominal_chain.flange(self.near) @ self.tool
         self.shift = np.broadcast_to(shift, (count, 3))
         self.turn = np.broadcast_to(turn, (count, 3))
@@ -53,7 +53,7 @@ class Off:
         wrench[:, 0] = np.arange(count)
         wanted = wanted or self.wanted
         return mirror(
-            self, wanted, goal or wanted, LoadCase(self.tool, wrench, NOTHING, self.status, self.near), **more
+            self, wanted, goal or wanted, LoadCase(self.tool, wrench, NOTHING, self.branch, self.near), **more
         )
 
 

@@ -18,7 +18,7 @@ from postproc.model import NOTHING, StiffnessModel
 from postproc.process import Wrenches
 from postproc.robot.axis_track import AxisTrack, is_near_singular, singular_words
 from postproc.robot.description import load_robot
-from postproc.robot.inverse import status_of
+from postproc.robot.inverse import branch_of
 from postproc.toolpath import Role
 
 TOOL = Poses(np.eye(3), np.array([0.02, 0.0, 0.3]))
@@ -72,12 +72,11 @@ def told(robot, before, after, source=None, moved=None, status=None, feed=None, 
     model = StiffnessModel(robot, ())
     wanted, command = (robot.nominal_chain.flange(q) @ TOOL for q in (before, after))
     path = motions(wanted)
-    path = replace(
-        path,
+    path = path.with_columns(
         feed=path.feed if feed is None else np.broadcast_to(feed, n),
         line=path.line if lines is None else np.array(lines),
     )
-    branch = status_of(robot.nominal, before) if closed else np.zeros(n, np.int8)
+    branch = branch_of(robot.nominal, before) if closed else np.zeros(n, np.int8)
     yes = np.ones(n, bool)
     tool = Poses(np.tile(TOOL.rotation, (n, 1, 1)), np.tile(TOOL.position, (n, 1)))
     world = Poses(np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3)))
@@ -203,7 +202,7 @@ def test_a_motion_in_no_branch_is_not_looked_at():
     """Though its joints be known, and those of the branch with the highest number."""
     robot = kr270()
     before = [-129.0, -117.0, -1.0, 9.0, -76.0, 348.0]
-    assert status_of(robot.nominal, np.radians([before])).tolist() == [7]
+    assert branch_of(robot.nominal, np.radians([before])).tolist() == [7]
     after = [[*before[:5], 349.5]]
     assert told(robot, [before], after)[0] == [("KIN008", 10, near("A6", "0.50"))]
     assert told(robot, [before], after, status=[-1]) == ([], {})

@@ -294,7 +294,7 @@ def test_the_axes_follow_an_arc_that_turns_the_tool() -> None:
     q = track.q[1]
     for share in np.linspace(0, 1, 400)[1:]:
         pose = ways.at(np.array([2]), np.array([share])) @ Poses(np.eye(3), np.array([0, 0, 0.2])).inverse()
-        q = inverse(kr270().nominal, pose, track.status[[2]], q[None]).q[0]
+        q = inverse(kr270().nominal, pose, track.branch[[2]], q[None]).q[0]
     np.testing.assert_allclose(q, track.q[2], atol=1e-6)
 
 

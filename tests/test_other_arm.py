@@ -30,7 +30,9 @@ def test_deflections_of_another_arm_are_refused(robot: str, remain: int) -> None
 def test_no_robot_file_is_written_of_them(tmp_path: Path) -> None:
     new = tmp_path / "new.yaml"
     with pytest.raises(Refusal) as caught:
-        identify(IdentifyRequest((LOADS,), "abb_irb120", ("joint_compliance",), output=new, bootstrap=0))
+        identify(
+            IdentifyRequest((LOADS,), "abb_irb120", effects=("joint_compliance",), output=new, bootstrap=0)
+        )
     assert caught.value.findings[0].code == "IDN035"
     assert not new.exists()
 

@@ -41,7 +41,7 @@ def mapped(folder):
 def identified(folder):
     data, effects = SAMPLES / "kr270_campaign" / "loads.csv", ("joint_compliance", "gravity_compensator")
     written = {"output": folder / "new.yaml", "page": folder / "identify.html"}
-    return identify(IdentifyRequest((data,), None, effects, bootstrap=20, **written))
+    return identify(IdentifyRequest((data,), effects=effects, bootstrap=20, **written))
 
 
 def diagnosed(folder):
@@ -144,7 +144,7 @@ def test_a_page_replaces_neither_an_input_nor_another_result(tmp_path, name):
     data.write_bytes((SAMPLES / "kr270_campaign" / "loads.csv").read_bytes())
     before = data.read_bytes()
     request = IdentifyRequest(
-        (data,), None, ("joint_compliance",), output=tmp_path / "new.yaml", page=tmp_path / name
+        (data,), effects=("joint_compliance",), output=tmp_path / "new.yaml", page=tmp_path / name
     )
     with pytest.raises(Refusal, match="FIL007"):
         identify(request)

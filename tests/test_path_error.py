@@ -29,7 +29,7 @@ def reached(task, row, pose, wrench):
     rotation, position = pose
     flange_turn = rotation @ tool.rotation.T
     flange = Poses(flange_turn[None], (position - flange_turn @ tool.position)[None])
-    q = inverse(task.model.robot.nominal, flange, task.track.status[[row]], task.track.q[[row]]).q
+    q = inverse(task.model.robot.nominal, flange, task.track.branch[[row]], task.track.q[[row]]).q
     return task.model.equilibrium(q, wrench[None], tool).pose.position[0]
 
 

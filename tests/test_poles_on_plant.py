@@ -16,7 +16,7 @@ from postproc.cell import frames_of, load_cell
 from postproc.model import StiffnessModel
 from postproc.process import wrenches
 from postproc.robot.description import find_robot, load_robot
-from postproc.robot.inverse import inverse, status_of
+from postproc.robot.inverse import branch_of, inverse
 from postproc.workflows.preparation import read_program
 
 SAMPLES = 8
@@ -48,7 +48,7 @@ def on_plant(source, output, cell_path):
         [pose(before[r - 1], before[r], s, base, zero)[0].position for r, s in zip(owner, share, strict=True)]
     )
     wrench = force.along(owner, share)
-    status = status_of(robot.nominal, np.radians(cell.start)[None])
+    status = branch_of(robot.nominal, np.radians(cell.start)[None])
 
     def axes(at, near):
         flange = Poses(at.rotation[None], at.position[None]) @ tool.inverse()

@@ -24,7 +24,7 @@ NONE, Z, ACROSS = np.full(3, np.nan), np.array([0.0, 0.0, 1.0]), np.array([0.6, 
 def predicted(job, rows, command, wrench):
     tool = Poses(np.tile(TOOL.rotation, (len(rows), 1, 1)), np.tile(TOOL.position, (len(rows), 1)))
     return predict(
-        job.model, command, LoadCase(tool, wrench, NOTHING, job.track.status[rows], job.track.q[rows])
+        job.model, command, LoadCase(tool, wrench, NOTHING, job.track.branch[rows], job.track.q[rows])
     )
 
 
@@ -156,7 +156,7 @@ def test_a_correction_begins_anew_where_the_force_jumps_in_any_component(scale, 
     for every in (np.ones(9, bool), np.zeros(9, bool)):
         assert forced.steps(np.array([0]), every).tolist() == [True]
     # with another tool as well
-    path = replace(job.toolpath, tool=np.arange(9) % 2)
+    path = job.toolpath.with_columns(tool=np.arange(9) % 2)
     assert replace(forced, toolpath=path).steps(rows, np.ones(9, bool)).all()
 
 

@@ -43,7 +43,7 @@ def program(comments=(), feed=0.06, notes=(), **more):
     kinds = [Kind.PTP] + [Kind.LIN] * 3 + [Kind.PTP] + [Kind.LIN] * 2
     path = path_of(points, kinds, notes=notes, **more)
     comments = tuple(Annotation(row, text, 9 + row) for row, text in comments)
-    return replace(path, feed=np.broadcast_to(feed, (7,)), comments=comments)
+    return path.with_columns(feed=np.broadcast_to(feed, (7,)), comments=comments)
 
 
 # mean force at 0.06 m/s: 12000 / 60 * 3 = 600 teeth a second, 0.1 mm per tooth
@@ -197,7 +197,7 @@ def test_rapid_and_force_off_and_plunges_are_air(tmp_path):
     path = program(feed=feed)
     points = path.position.copy()
     points[6] = points[5] + [0, 0, -0.02]
-    result = run(replace(path, position=points), spec)
+    result = run(path.with_columns(position=points), spec)
     assert np.flatnonzero(result.carries).tolist() == [1, 3, 5]
     (told,) = [f for f in result.findings if f.code == "FRC014"]
     assert (told.line, told.severity) == (16, "info")

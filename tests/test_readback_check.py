@@ -33,7 +33,7 @@ class Seen:
     residual: list[Any]
 
     def hold(self, **of_back: object) -> None:
-        check_readback(*self.held[:5], replace(self.held[5], **of_back), self.held[6])
+        check_readback(*self.held[:5], self.held[5].with_columns(**of_back), self.held[6])
 
     def column(self, name: str, at: object, value: object) -> None:
         """Holds with one value of a column changed, of the toolpath or of a part of it (``arcs.sweep``)."""

@@ -14,11 +14,11 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import Poses, vector_from_rotation, wrapped
 from postproc.model import StiffnessModel
 from postproc.robot.axis_track import follow_axes, is_near_singular
+from postproc.robot.branches import negative_axes
 from postproc.robot.chain import Chain, generalized_force
 from postproc.robot.description import find_robot, load_robot, robot_files
 from postproc.robot.geometries import KukaLengths
-from postproc.robot.inverse import inverse, status_of, turn_of
-from postproc.robot.stated_branches import sides
+from postproc.robot.inverse import branch_of, inverse
 from postproc.toolpath import Kind
 
 DEG = math.pi / 180
@@ -65,7 +65,7 @@ def test_jacobian_is_pinocchios(chain, robot):
     rng = np.random.default_rng(2)
     q, tool = random_angles(robot, 50, rng), random_tools(50, rng)
     ours = chain.jacobian(q, tool)
-    flange = chain.model.frames[chain.flange_id]
+    flange = chain.model.frames[chain.model.getFrameId("flange")]
     for row in range(len(q)):
         model = chain.model.copy()
         place = flange.placement * pin.SE3(tool.rotation[row], tool.position[row])
@@ -151,7 +151,7 @@ def test_inverse_of_forward_in_all_branches(robot, arm):
     arm = arm or robot.arm
     arms, rng = chain_of(arm, robot), np.random.default_rng(5)
     q = rng.uniform(-math.pi, math.pi, (4000, 6))
-    branch = status_of(arm, q)
+    branch = branch_of(arm, q)
     assert sorted(set(branch)) == list(range(8))
     pose = arms.flange(q)
     found = inverse(arm, pose, branch, q)
@@ -161,7 +161,7 @@ def test_inverse_of_forward_in_all_branches(robot, arm):
     assert turned < 1e-9
     clear = ~is_near_singular(replace(robot, nominal=arm), q)
     assert clear.sum() > 3000
-    assert np.array_equal(status_of(arm, found.q[clear]), branch[clear])
+    assert np.array_equal(branch_of(arm, found.q[clear]), branch[clear])
     assert np.abs(found.q - q)[clear].max() < 1e-10
 
 
@@ -175,7 +175,7 @@ def test_every_branch_reaches_the_pose_its_own_way(chain, robot):
     far, turned = apart(chain.flange(found.q[rows]), pose[rows])
     assert far < 1e-9
     assert turned < 1e-9
-    assert np.array_equal(status_of(robot.arm, found.q[rows]), rows)
+    assert np.array_equal(branch_of(robot.arm, found.q[rows]), rows)
     for one in rows:
         for other in rows[rows > one]:
             assert np.abs(wrapped(found.q[one] - found.q[other])).max() > 0.1
@@ -186,7 +186,7 @@ def test_turns_are_those_nearest_to_the_wish(chain, robot):
     turns = np.random.default_rng(7).integers(-1, 2, (200, 3))
     far = q.copy()
     far[:, [0, 3, 5]] += 2 * math.pi * turns
-    found = inverse(robot.arm, chain.flange(q), status_of(robot.arm, q), far + 0.5)
+    found = inverse(robot.arm, chain.flange(q), branch_of(robot.arm, q), far + 0.5)
     assert np.abs(found.q - far).max() < 1e-10
 
 
@@ -220,14 +220,14 @@ def test_undefined_axes_take_the_wish(chain, robot):
     q = np.radians([[10.0, -90, 90, 40, 0, 25]])
     for wish in (40.0, -30.0, 170.0):
         near = np.radians([[0.0, 0, 0, wish, 0, 0]])
-        found = inverse(robot.arm, chain.flange(q), status_of(robot.arm, q), near)
+        found = inverse(robot.arm, chain.flange(q), branch_of(robot.arm, q), near)
         assert found.q[0, 3] == pytest.approx(wish * DEG)
         assert max(apart(chain.flange(found.q), chain.flange(q))) < 1e-9
     second, tilt = math.hypot(1.1, 0.055), math.atan2(0.055, 1.1)
     a2 = -math.pi / 2
     a23 = math.acos(-(0.35 + 1.25 * math.cos(a2)) / second) - tilt  # wrist centre on axis 1
     q = np.array([[0.7, a2, a23 - a2, 0.2, 0.9, 0.4]])
-    found = inverse(robot.arm, chain.flange(q), status_of(robot.arm, q), q)
+    found = inverse(robot.arm, chain.flange(q), branch_of(robot.arm, q), q)
     assert found.q[0, 0] == pytest.approx(0.7)
     assert max(apart(chain.flange(found.q), chain.flange(q))) < 1e-8
 
@@ -249,14 +249,14 @@ def test_undefined_axes_take_the_wish(chain, robot):
     ],
 )
 def test_status_bits(robot, degrees, status):
-    assert status_of(robot.arm, np.radians([degrees]))[0] == status
+    assert branch_of(robot.arm, np.radians([degrees]))[0] == status
 
 
 def test_turn_bits():
     q = np.array(
         [[0.1] * 6, [-0.1] * 6, [0.0] * 6, [0.1, -0.1, 0.1, -4.0, 0.1, 0.1], [4.0, 0, 0, 0, 0, -4.0]]
     )
-    assert turn_of(q).tolist() == [0, 0b111111, 0, 0b001010, 0b100000]
+    assert negative_axes(q).tolist() == [0, 0b111111, 0, 0b001010, 0b100000]
 
 
 def test_near_singular_places(robot):
@@ -325,7 +325,7 @@ def test_limits_are_flagged_either_side(robot, chain):
 def test_axis_motion_sets_branch_and_turns(robot, chain):
     q = steps(A4=[20, 200, 210, 220])
     track = tracked(robot, chain, q, None, axes={1: q[1]})
-    assert track.status.tolist() == [-1, 2, 2, 2]
+    assert track.branch.tolist() == [-1, 2, 2, 2]
     assert np.isnan(track.q[0]).all()
     assert np.abs(track.q[1:] - q[1:]).max() < 1e-9
     assert track.reachable.all()
@@ -343,7 +343,7 @@ def test_stated_turn_resets_the_turns(robot, chain, sign):
         q[0],
         kind=[Kind.LIN, Kind.PTP, Kind.LIN],
         status=[-1, 2, -1],
-        turn=[-1, turn_of(q)[1], -1],
+        turn=[-1, negative_axes(q)[1], -1],
     )
     assert np.abs(track.q - q).max() < 1e-9
     assert track.turn_matches.all()
@@ -352,27 +352,27 @@ def test_stated_turn_resets_the_turns(robot, chain, sign):
 def test_path_motions_do_not_obey_s_and_t(robot, chain):
     """A LIN keeps its branch and goes the short way whatever stands with it; that a T is wrong is told."""
     q = steps(A4=[150.0, 190.0])
-    other = turn_of(q)[1] ^ 0b001000
+    other = negative_axes(q)[1] ^ 0b001000
     track = tracked(robot, chain, q, q[0], status=[-1, 6], turn=[-1, other])
     assert np.abs(track.q - q).max() < 1e-9
-    assert track.status.tolist() == [2, 2]
+    assert track.branch.tolist() == [2, 2]
     assert track.turn_matches.tolist() == [True, False]
 
 
 def test_ptp_takes_the_branch_of_its_s(robot, chain):
     q = steps(A5=[45.0, 45.0, 45.0])
     track = tracked(robot, chain, q, q[0], kind=Kind.PTP, status=[-1, 6, -1])
-    assert track.status.tolist() == [2, 6, 6]
+    assert track.branch.tolist() == [2, 6, 6]
     assert track.q[1:, 4] == pytest.approx(-45 * DEG)
     far, turned = apart(chain.flange(track.q), chain.flange(q))
     assert max(far, turned) < 1e-9
-    assert np.array_equal(sides(robot, track.q)[0], track.status)
+    assert np.array_equal(branch_of(robot.nominal, track.q), track.branch)
 
 
 @pytest.mark.parametrize("axis", range(6))
 def test_turn_of_a_defined_axis_that_is_wrong_is_told(robot, chain, axis):
     q = steps(A4=[20.0])
-    stated = int(turn_of(q)[0]) ^ (1 << axis)
+    stated = int(negative_axes(q)[0]) ^ (1 << axis)
     track = tracked(robot, chain, q, q[0], kind=Kind.PTP, status=2, turn=stated)
     # A1, A4, A6 can obey by a whole turn (A1 then leaves its limits); the others can not
     assert track.turn_matches[0] == (axis in (0, 3, 5))
@@ -394,13 +394,13 @@ def test_home_is_where_the_program_starts(robot, chain):
     unknown = Poses(target.rotation.copy(), target.position.copy())
     unknown.rotation[3], unknown.position[3] = np.nan, np.nan
     track = follow_axes(robot, motions(unknown, **words, refused={3: home}), unknown, q[0])
-    assert track.status.tolist() == [2, 6, 6, 2, 2]
+    assert track.branch.tolist() == [2, 6, 6, 2, 2]
     assert np.abs(track.q - q)[[0, 1, 2, 4]].max() < 1e-9
     assert np.isnan(track.q[3]).all()
     # a PTP to a place that nothing tells loses the branch instead, until something says it
     other = {3: Finding("KRL003", "not declared")}
     track = follow_axes(robot, motions(unknown, **words, refused=other), unknown, q[0])
-    assert track.status.tolist() == [2, 6, 6, -1, -1]
+    assert track.branch.tolist() == [2, 6, 6, -1, -1]
     assert np.isnan(track.q[3:]).all()
     assert track.reachable.all()
 
@@ -409,17 +409,17 @@ def test_motion_of_unknown_kind_loses_the_branch_where_it_leads_nowhere_known(ro
     q = steps(A5=[45.0, 45.0, 45.0, 45.0])
     kinds = [Kind.LIN, Kind.OTHER, Kind.LIN, Kind.LIN]
     known = tracked(robot, chain, q, q[0], kind=kinds, axes={3: q[3]})
-    assert known.status.tolist() == [2, 2, 2, 2]
+    assert known.branch.tolist() == [2, 2, 2, 2]
     target = chain.flange(q)
     target.rotation[1], target.position[1] = np.nan, np.nan
     track = follow_axes(robot, motions(target, kind=kinds, axes={3: q[3]}), target, q[0])
-    assert track.status.tolist() == [2, -1, -1, 2]
+    assert track.branch.tolist() == [2, -1, -1, 2]
 
 
 def test_unknown_start(robot, chain):
     q = steps(A4=[20.0, 30.0, 40.0])
     track = tracked(robot, chain, q, None)
-    assert track.status.tolist() == [-1, -1, -1]
+    assert track.branch.tolist() == [-1, -1, -1]
     assert np.isnan(track.q).all()
     assert track.reachable.all()
     assert track.turn_matches.all()

@@ -22,7 +22,7 @@ from postproc.robot.axis_track import nominal_flange
 from postproc.robot.chain import Chain
 from postproc.robot.description import check_programmable, find_robot, load_robot, robot_files
 from postproc.robot.geometries import KukaLengths, KukaVariant, SerialArm
-from postproc.robot.inverse import inverse, status_of
+from postproc.robot.inverse import branch_of, inverse
 
 DEG = math.pi / 180
 
@@ -119,7 +119,7 @@ def test_shipped_robot_goes_there_and_back(name):
     q = states(robot, 3000)
     pose = nominal_flange(robot, q)
     near = q + np.random.default_rng(1).uniform(-0.03, 0.03, q.shape)
-    found = inverse(robot.nominal, pose, status_of(robot.nominal, q), near)
+    found = inverse(robot.nominal, pose, branch_of(robot.nominal, q), near)
     assert found.reachable.all()
     back = nominal_flange(robot, found.q)
     assert np.abs(back.position - pose.position).max() < 1e-9
@@ -200,7 +200,7 @@ def test_irb120_is_inverted_within_its_limits():
     """Upper arm far back: the closed form's angle is past half a turn there, the controller's is not."""
     robot = load_robot(find_robot("abb_irb120"))
     q = np.radians([[20.0, -105, -100, 30, 40, 50], [20, 105, 60, -30, -40, 300]])
-    found = inverse(robot.nominal, nominal_flange(robot, q), status_of(robot.nominal, q), q)
+    found = inverse(robot.nominal, nominal_flange(robot, q), branch_of(robot.nominal, q), q)
     assert np.abs(found.q - q).max() < 1e-10
 
 
@@ -392,8 +392,8 @@ def test_controllers_senses_of_a_kuka_type_arm(tmp_path):
     ours, theirs = nominal_flange(robot, q), nominal_flange(plain, angles)
     assert np.abs(ours.position - theirs.position).max() < 1e-13
     assert np.abs(ours.rotation - theirs.rotation).max() < 1e-13
-    assert np.array_equal(status_of(robot.nominal, q), status_of(plain.nominal, angles))
-    found = inverse(robot.nominal, ours, status_of(robot.nominal, q), q)
+    assert np.array_equal(branch_of(robot.nominal, q), branch_of(plain.nominal, angles))
+    found = inverse(robot.nominal, ours, branch_of(robot.nominal, q), q)
     clear = np.abs(np.sin(q[:, 4])) > 0.01
     assert np.abs(found.q - q)[clear].max() < 1e-9
 
@@ -418,7 +418,7 @@ def test_kuka_on_a_linear_axis(tmp_path):
     assert np.abs(ours.position - moved).max() < 1e-13
     chain = Chain(robot.joints, robot.flange)
     assert np.abs(reference_flange(chain, q).position - ours.position).max() < 1e-13
-    found = inverse(robot.nominal, ours, status_of(robot.nominal, q), q)
+    found = inverse(robot.nominal, ours, branch_of(robot.nominal, q), q)
     clear = np.abs(np.sin(q[:, 5])) > 0.01
     assert np.array_equal(found.q[:, 0], q[:, 0])
     assert np.abs(found.q - q)[clear].max() < 1e-9

@@ -262,7 +262,7 @@ def test_a_long_way_is_looked_at_even_if_the_correction_is_the_same_at_both_ends
     [
         lambda task: replace(task, tolerance=1e-7),
         lambda task: replace(task, tolerance_angle=1e-9),
-        lambda task: replace(task, toolpath=replace(task.toolpath, tool=np.arange(401) % 2)),
+        lambda task: replace(task, toolpath=task.toolpath.with_columns(tool=np.arange(401) % 2)),
         lambda task: replace(task, track=replace(task.track, q=task.track.q * 1000.0)),
     ],
     ids=["position", "angle", "tool", "axes"],

@@ -248,7 +248,7 @@ def test_an_arc_that_stays_begins_where_it_was_programmed():
 
 
 def again(task, **words):
-    return replace(task, toolpath=replace(task.toolpath, **words))
+    return replace(task, toolpath=task.toolpath.with_columns(**words))
 
 
 def not_before(task, why):
@@ -593,7 +593,7 @@ def test_behind_another_tool_a_motion_begins_with_its_own():
     longer = Poses(rotation_from_vector([0.1, 0.2, 0.3]), np.array([0.05, -0.02, 0.4]))
     tool = task.tool.copy()
     tool.put(slice(2, 4), longer)
-    path = replace(task.toolpath, tool=np.array([0, 0, 1, 1]))
+    path = task.toolpath.with_columns(tool=np.array([0, 0, 1, 1]))
     task = replace(task, tool=tool, toolpath=path)
     result = correct(line())
     division = subdivide(line(), result, Limits(no_insert=True))

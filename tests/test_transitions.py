@@ -71,7 +71,7 @@ def test_the_motion_in_air_ends_where_the_tool_is_on_the_path_under_the_force():
 )
 def test_what_can_not_lead_in_is_left_and_a_link_does(change):
     job = led()
-    job = replace(job, toolpath=replace(job.toolpath, **change))
+    job = replace(job, toolpath=job.toolpath.with_columns(**change))
     _, division = divided(job)
     assert not len(division.lead_ins)
     assert division.source[division.transitions].tolist() == [2]
@@ -211,7 +211,7 @@ def test_short_programs_may_grow_by_a_few_motions(growth, least, allowed):
 @pytest.mark.parametrize(("feed", "cycle"), [(0.05, 0.012), (0.5, 0.012), (0.5, 0.1)])
 def test_no_piece_is_shorter_than_the_controller_runs_without_slowing(feed, cycle):
     job = circle(tolerance=1e-9)
-    job = replace(job, toolpath=replace(job.toolpath, feed=np.full(4, feed)))
+    job = replace(job, toolpath=job.toolpath.with_columns(feed=np.full(4, feed)))
     _, division = divided(job, Limits(max_growth=1e4, cycle=cycle, min_segment=1e-3))
     pieces = np.diff(np.append(0.0, division.share[(division.source == 2) & ~division.transitions]))
     shortest = pieces.min() * job.desired_path.length[2]

@@ -64,7 +64,7 @@ def turned_base(task):
 
 def loaded(task, command, wrench):
     q = predict(
-        task.model, command, LoadCase(task.tool, wrench, NOTHING, task.track.status, task.track.q)
+        task.model, command, LoadCase(task.tool, wrench, NOTHING, task.track.branch, task.track.q)
     ).q  # the motors do not depend on the force
     return task.model.equilibrium(q, wrench, task.tool).pose.position
 
@@ -256,7 +256,7 @@ def test_a_touched_off_base_moves_with_the_robot_that_touched_it(count):
         q = predict(
             task.model,
             result.command[:],
-            LoadCase(task.tool, task.wrench, NOTHING, task.track.status, task.track.q),
+            LoadCase(task.tool, task.wrench, NOTHING, task.track.branch, task.track.q),
         ).q
         tool = model.equilibrium(q, scale * task.wrench, task.tool).pose.position
         points = task.touched_off
@@ -292,11 +292,11 @@ def test_air_in_a_base_that_was_not_touched_stays():
     model = with_compensator(paper(), **SOFTER)
     task = job(model, 4)
     task = touched(task, task.wanted.position[:1])
-    other = replace(task.toolpath, base=np.array([0, 1, 0, 1]))
+    other = task.toolpath.with_columns(base=np.array([0, 1, 0, 1]))
     task = replace(task, toolpath=other)
     rows = np.arange(4)
     still = predict(
-        model, task.wanted, LoadCase(task.tool, np.zeros((4, 6)), NOTHING, task.track.status, task.track.q)
+        model, task.wanted, LoadCase(task.tool, np.zeros((4, 6)), NOTHING, task.track.branch, task.track.q)
     ).pose
     goal = task.goal(rows, task.wanted)
     np.testing.assert_allclose(goal.position[1::2], still.position[1::2], atol=1e-9)

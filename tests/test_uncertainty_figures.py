@@ -373,7 +373,7 @@ def test_a_doubt_is_made_of_differences_of_predictions(process, each):
 
     def placed(model, command, wrench):
         return predict(
-            model, command, LoadCase(task.tool, wrench, NOTHING, task.track.status, task.track.q)
+            model, command, LoadCase(task.tool, wrench, NOTHING, task.track.branch, task.track.q)
         ).pose.position
 
     def held(model, q, wrench):
@@ -381,7 +381,7 @@ def test_a_doubt_is_made_of_differences_of_predictions(process, each):
 
     def motors(command, wrench):
         return predict(
-            task.model, command, LoadCase(task.tool, wrench, NOTHING, task.track.status, task.track.q)
+            task.model, command, LoadCase(task.tool, wrench, NOTHING, task.track.branch, task.track.q)
         ).q
 
     none = np.zeros_like(task.wrench)

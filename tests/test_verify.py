@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import LINES
+from motions import toolpath_of
 from path_cases import circle, line
 from path_cases import task as hand_made
 
@@ -18,7 +19,7 @@ from postproc.compensation.subdivision import Limits
 from postproc.output.write import plan_motions
 from postproc.report.report import Spread
 from postproc.report.verified import verdict_sentence
-from postproc.toolpath import Arcs, Configuration, Kind, Toolpath
+from postproc.toolpath import Arcs, Configuration, Kind
 from postproc.verification.pairing import Different, pair_motions
 from postproc.verification.simulator import Simulator
 from postproc.workflows.preparation import Request, prepare
@@ -35,7 +36,7 @@ def as_run(task, limits=None, gain=1.0):
     division = subdivide(task, correct(task), limits or Limits(max_growth=100.0))
     plan, old = plan_motions(task, division), task.toolpath
     kind = np.where(division.transitions, Kind.LIN, old.kind[plan.source])
-    path = Toolpath(
+    path = toolpath_of(
         kind=kind,
         position=plan.position[:],
         rotation=plan.rotation[:],
@@ -51,7 +52,7 @@ def as_run(task, limits=None, gain=1.0):
         stops=old.stops[plan.source],
     )
     base, tool = task.base[plan.source], task.tool[plan.source]
-    track = replace(task.track, q=task.track.q[plan.source], status=task.track.status[plan.source])
+    track = replace(task.track, q=task.track.q[plan.source], branch=task.track.branch[plan.source])
     run = replace(task, toolpath=path, wanted=base @ path.target_in_base, base=base, tool=tool, track=track)
     return run, division
 

@@ -129,7 +129,7 @@ def test_a_force_that_can_not_be_followed_gives_no_figure():
 def approximated(distance):
     made = bend()
     blend = np.array([0.0, 0.0, distance, 0.0, 0.0])
-    return replace(made, toolpath=replace(made.toolpath, approximation=blend, stops=blend == 0.0))
+    return replace(made, toolpath=made.toolpath.with_columns(approximation=blend, stops=blend == 0.0))
 
 
 def test_a_vertex_is_passed_on_the_parabola():
@@ -163,7 +163,7 @@ def test_approximated_corners_are_compared_as_they_are_run():
     run = as_run(original)[0]
     _, after = simulated(original, run)
     assert after.largest < 0.6 * MM
-    sharp = replace(run, toolpath=replace(run.toolpath, approximation=np.zeros(len(run.toolpath))))
+    sharp = replace(run, toolpath=run.toolpath.with_columns(approximation=np.zeros(len(run.toolpath))))
     _, other = simulated(original, sharp)
     assert other.largest > 20 * MM / 4 * np.sqrt(2) * 0.9
 
@@ -192,7 +192,7 @@ def test_a_program_differs_in_nothing_from_itself():
 def test_what_differs_is_told(column, row, value, what):
     original = approximated(5 * MM)
     feed = np.full(5, 0.02)
-    original = replace(original, toolpath=replace(original.toolpath, feed=feed))
+    original = replace(original, toolpath=original.toolpath.with_columns(feed=feed))
     stated = column in original.toolpath.configuration.numbers
     path = original.toolpath
     values = np.array(path.configuration[column] if stated else getattr(path, column))
@@ -200,7 +200,7 @@ def test_what_differs_is_told(column, row, value, what):
     changes = {"configuration": Configuration({column: values})} if stated else {column: values}
     if column == "approximation":
         changes["stops"] = values == 0.0
-    run = replace(original, toolpath=replace(original.toolpath, **changes))
+    run = replace(original, toolpath=original.toolpath.with_columns(**changes))
     assert differing(original, run) == ({what} if what else set())
 
 
@@ -217,7 +217,7 @@ def test_a_point_in_air_is_where_it_was():
         place = original.toolpath.position.copy()
         place[row, 2] += 0.3 * MM
         wanted = replace(original.wanted, position=place)
-        moved = replace(original, wanted=wanted, toolpath=replace(original.toolpath, position=place))
+        moved = replace(original, wanted=wanted, toolpath=original.toolpath.with_columns(position=place))
         assert ("the air move has another end than in the original" in differing(original, moved)) != allowed
 
 

@@ -151,7 +151,7 @@ def test_a_chain_is_pinocchios_where_there_is_pinocchio():
         ours = chain.evaluate(q.T.copy(), Poses.identity())
         for row, state in enumerate(q):
             pin.framesForwardKinematics(model, data, state)
-            place = data.oMf[chain.flange_id]
+            place = data.oMf[chain.model.getFrameId("flange")]
             np.testing.assert_allclose(ours.position[:, row], place.translation, atol=1e-12)
             for column in range(3):
                 np.testing.assert_allclose(ours.tcp[column][:, row], place.rotation[:, column], atol=1e-12)

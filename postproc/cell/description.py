@@ -12,6 +12,7 @@ from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
 from postproc.cell.stated_room import StatedRoom
 from postproc.cell.tool_errors import ToolError
+from postproc.languages import DIALECT_OPTIONS
 from postproc.robot.external_axes import ExternalAxis
 from postproc.toolpath.initial_state import UNSTATED, InitialState, Symbol
 
@@ -76,11 +77,11 @@ class Cell:
     tolerance, max_correction, min_segment [m]; tolerance_angle [rad].  ``force`` is the text of the key, a path
     in it is relative to the cell file; ``force_line`` is where it is.  ``force_ci95``: half width of the 95 %
     interval of all forces, as a share of them; None where nothing is stated.  ``dialect``: name of the programs'
-    language, where their names and contents do not identify it; ``config_dat``: the controller's $config.dat, relative
-    to the cell file.  ``force_vector``: intervals of the forces besides their scale; ``force_factors``: operation ->
-    what was learnt of its force; ``tool_errors``: number of a tool -> how it differs from what is programmed;
-    ``force_ramp`` [m]: the path over
-    which a force changes, None where it is not stated.  ``correct``: one of ``MODES``; ``touch_points``: number of a
+    language, where their names and contents do not identify it; ``dialect_options``: key of a ``DialectOption`` -> what
+    is stated for it, a file relative to the cell file.  ``force_vector``: intervals of the forces besides their scale;
+    ``force_factors``: operation -> what was learnt of its force; ``tool_errors``: number of a tool -> how it differs
+    from what is programmed; ``force_ramp`` [m]: the path over which a force changes, None where it is not stated.
+    ``correct``: one of ``MODES``; ``touch_points``: number of a
     base -> (K, 3) [m] places in it at which it was touched off, None for the one base that a program uses;
     ``touch_line`` is where they are.  ``temperature`` [degC] of the robot.
     ``symbols``: values of names that only the controller knows; ``program_start``: the state at the first statement;
@@ -109,10 +110,9 @@ class Cell:
     growth_stated: bool = False
     segment_stated: bool = False
     controller: Controller = Controller()
-    integer_words: str = ""
     dialect: str | None = None
     dialect_line: int = 0
-    config_dat: str | None = None
+    dialect_options: Mapping[str, str] = field(default_factory=dict)
     force_vector: ForceVectorInterval | None = None
     force_ramp: float | None = None
     force_factors: Mapping[str, ForceFactor] = field(default_factory=dict)
@@ -127,6 +127,12 @@ class Cell:
     program_start: InitialState = UNSTATED
     room: StatedRoom | None = None
     findings: tuple[Finding, ...] = ()
+
+    @property
+    def dialect_files(self) -> list[Path]:
+        """The files that ``dialect_options`` names."""
+        files = [one.key for one in DIALECT_OPTIONS if one.is_file]
+        return [self.path.parent / self.dialect_options[key] for key in files if key in self.dialect_options]
 
     @property
     def cycle_ms(self) -> float:

@@ -79,7 +79,7 @@ def number_literal_tools(cell: Cell, toolpath: Toolpath) -> Toolpath:
             numbers = [number for number, tool in cell.tools.items() if _same(tool.pose, frame.pose)]
             if len(numbers) == 1:
                 frames[index] = replace(frame, number=numbers[0])
-    return toolpath if frames == list(toolpath.frames) else replace(toolpath, frames=tuple(frames))
+    return toolpath if frames == list(toolpath.frames) else toolpath.with_columns(frames=tuple(frames))
 
 
 def _pose(frame: FrameRef, numbered: dict[int, Poses]) -> Poses:

@@ -22,6 +22,7 @@ from postproc.cell.description import MODES, Cell, Controller, ForceFactor, Forc
 from postproc.cell.implausible import implausible
 from postproc.cell.stated_room import read_room
 from postproc.cell.tool_errors import OTHERS, read_tool_error
+from postproc.languages import DIALECT_OPTIONS
 from postproc.robot.read_external_axes import read_external
 
 NAME = "cell.yaml"
@@ -126,7 +127,7 @@ def load_cell(path: Path) -> Cell:
         )
     scale, vector = _force_interval(top)
     dialect = top.section("dialect", None)
-    dialect.only("integer_words", "name", "config_dat")
+    dialect.only("name", *(option.key for option in DIALECT_OPTIONS))
     cell = Cell(
         path=path,
         robot=_word(top, "robot"),
@@ -153,10 +154,15 @@ def load_cell(path: Path) -> Cell:
             controller.flag("gravity_compensated", False),
             controller.number("cycle_ms", 12.0, low=0.1, high=100.0, unit="ms"),
         ),
-        integer_words=dialect.text("integer_words", "", ("mm", "um")),
         dialect=_word(dialect, "name") if "name" in dialect else None,
         dialect_line=dialect.line_of("name") if "name" in dialect else 0,
-        config_dat=_word(dialect, "config_dat") if "config_dat" in dialect else None,
+        dialect_options={
+            option.key: dialect.text(option.key, "", option.choices)
+            if option.choices
+            else _word(dialect, option.key)
+            for option in DIALECT_OPTIONS
+            if option.key in dialect
+        },
         force_vector=vector,
         force_factors=_force_factors(top),
         tool_errors={number: read_tool_error(section) for number, section in _numbered(top, "tool_errors")},

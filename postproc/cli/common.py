@@ -137,6 +137,13 @@ def _json_name(_context: click.Context, _option: click.Parameter, value: str | N
     raise click.BadParameter(f"{value!r} must end in .json, or be - for standard output")
 
 
+def with_options(command: _Command, *options: Callable[[_Command], _Command]) -> _Command:
+    """A command with these options, the first of which its help shows first."""
+    for decorate in reversed(options):
+        command = decorate(command)
+    return command
+
+
 def tare_option(command: _Command) -> _Command:
     """The zero of a measured force."""
     return click.option(
@@ -149,53 +156,45 @@ def tare_option(command: _Command) -> _Command:
 
 def insertion_options(command: _Command) -> _Command:
     """What the output may hold that the input does not: inserted motions and copies of points."""
-    for decorate in reversed(
-        (
-            click.option(
-                "--no-insert",
-                cls=RenamedOption,
-                is_flag=True,
-                help="Insert no motions; the path error that remains between the points is reported.",
-            ),
-            click.option(
-                "--shared-points",
-                cls=RenamedOption,
-                type=click.Choice(SHARED_POINTS),
-                help="What happens to a named point that several motions use: each motion gets a copy in its own line, "
-                "or as a new point in the .dat, or the point is kept and these motions are not corrected "
-                f"[{SHARED_POINTS[0]}].",
-            ),
-        )
-    ):
-        command = decorate(command)
-    return command
+    return with_options(
+        command,
+        click.option(
+            "--no-insert",
+            cls=RenamedOption,
+            is_flag=True,
+            help="Insert no motions; the path error that remains between the points is reported.",
+        ),
+        click.option(
+            "--shared-points",
+            cls=RenamedOption,
+            type=click.Choice(SHARED_POINTS),
+            help="What happens to a named point that several motions use: each motion gets a copy in its own line, "
+            "or as a new point in the .dat, or the point is kept and these motions are not corrected "
+            f"[{SHARED_POINTS[0]}].",
+        ),
+    )
 
 
 def many_programs_options(command: _Command) -> _Command:
     """What predicts and corrects each of many programs."""
-    for decorate in reversed(
-        (
-            click.option(
-                "--force",
-                metavar="[SPEC]",
-                default=None,
-                help="Machining force of every program. Without a value: the forces that belong to each program; with "
-                "a value: 0,360,560@base or a CSV, as in the main job.",
-            ),
-            tare_option,
-            click.option(
-                "--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cells'."
-            ),
-            language_options,
-            click.option(
-                "--gain", type=Decimal(0.0, 1.0), help="Share of the correction that is applied [1]."
-            ),
-            insertion_options,
-            click.option("--strict", is_flag=True, help="Treat warnings as errors."),
-        )
-    ):
-        command = decorate(command)
-    return command
+    return with_options(
+        command,
+        click.option(
+            "--force",
+            metavar="[SPEC]",
+            default=None,
+            help="Machining force of every program. Without a value: the forces that belong to each program; with "
+            "a value: 0,360,560@base or a CSV, as in the main job.",
+        ),
+        tare_option,
+        click.option(
+            "--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cells'."
+        ),
+        language_options,
+        click.option("--gain", type=Decimal(0.0, 1.0), help="Share of the correction that is applied [1]."),
+        insertion_options,
+        click.option("--strict", is_flag=True, help="Treat warnings as errors."),
+    )
 
 
 def allow_compensated_option(command: _Command) -> _Command:
@@ -210,79 +209,81 @@ def allow_compensated_option(command: _Command) -> _Command:
 
 def program_options(command: _Command) -> _Command:
     """PROGRAM and what predicts it."""
-    for decorate in reversed(
-        (
-            click.argument("program", type=click.Path(path_type=Path)),
-            click.option(
-                "--force",
-                metavar="[SPEC]",
-                default=None,
-                help="Machining force. Without a value: FORCE comments, <stem>.force.csv, or `force:` or `process:` "
-                "of the cell, whichever comes first. With a value: 0,360,560@base (world, tool, feed; six numbers "
-                "with moments), a CSV (by line, s_mm or t_s), or the YAML file of a cutting process.",
-            ),
-            tare_option,
-            click.option(
-                "--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cell's."
-            ),
-            language_options,
-            click.option("--strict", is_flag=True, help="Treat warnings as errors."),
-        )
-    ):
-        command = decorate(command)
-    return result_options(command)
+    return with_options(
+        result_options(command),
+        click.argument("program", type=click.Path(path_type=Path)),
+        click.option(
+            "--force",
+            metavar="[SPEC]",
+            default=None,
+            help="Machining force. Without a value: FORCE comments, <stem>.force.csv, or `force:` or `process:` "
+            "of the cell, whichever comes first. With a value: 0,360,560@base (world, tool, feed; six numbers "
+            "with moments), a CSV (by line, s_mm or t_s), or the YAML file of a cutting process.",
+        ),
+        tare_option,
+        click.option(
+            "--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cell's."
+        ),
+        language_options,
+        click.option("--strict", is_flag=True, help="Treat warnings as errors."),
+    )
 
 
 def language_options(command: _Command) -> _Command:
     """What a program does not state itself."""
-    for decorate in reversed(
-        (
-            click.option(
-                "--cell",
-                type=click.Path(path_type=Path),
-                help="Use this cell file instead of the nearest cell.yaml.",
-            ),
-            click.option(
-                "--config-dat",
-                type=click.Path(path_type=Path),
-                metavar="FILE",
-                help="The controller's $config.dat, for points and frames defined there [the cell's].",
-            ),
-        )
-    ):
-        command = decorate(command)
-    return command
+    return with_options(
+        command,
+        click.option(
+            "--cell",
+            type=click.Path(path_type=Path),
+            help="Use this cell file instead of the nearest cell.yaml.",
+        ),
+        click.option(
+            "--config-dat",
+            type=click.Path(path_type=Path),
+            metavar="FILE",
+            help="The controller's $config.dat, for points and frames defined there [the cell's].",
+        ),
+    )
 
 
 def readings_options(command: _Command) -> _Command:
     """DATA, their robot and tool, and the new robot file."""
-    for decorate in reversed(
-        (
-            click.argument("data", type=click.Path(path_type=Path), nargs=-1, required=True),
-            click.option(
-                "--robot",
-                type=ROBOT,
-                metavar="NAME|FILE",
-                help="Robot [the one named in the data: # robot: NAME].",
-            ),
-            click.option(
-                "-o",
-                "--output",
-                type=click.Path(path_type=Path, dir_okay=False),
-                metavar="NEW.yaml",
-                callback=require_suffix(".yaml", ".yml"),
-                help="Write a new robot file with the identified values [only report].",
-            ),
-            click.option(
-                "--tool",
-                metavar="X,Y,Z[,A,B,C]",
-                callback=tool_place,
-                help="TCP on the flange, mm and deg, if the data do not state it (# tool: x y z) [the flange].",
-            ),
-        )
-    ):
-        command = decorate(command)
-    return command
+    return with_options(
+        command,
+        click.argument("data", type=click.Path(path_type=Path), nargs=-1, required=True),
+        click.option(
+            "--robot",
+            type=ROBOT,
+            metavar="NAME|FILE",
+            help="Robot [the one named in the data: # robot: NAME].",
+        ),
+        click.option(
+            "-o",
+            "--output",
+            type=click.Path(path_type=Path, dir_okay=False),
+            metavar="NEW.yaml",
+            callback=require_suffix(".yaml", ".yml"),
+            help="Write a new robot file with the identified values [only report].",
+        ),
+        click.option(
+            "--tool",
+            metavar="X,Y,Z[,A,B,C]",
+            callback=tool_place,
+            help="TCP on the flange, mm and deg, if the data do not state it (# tool: x y z) [the flange].",
+        ),
+    )
+
+
+def picture_option(help: str) -> Callable[[_Command], _Command]:
+    """The result as a picture."""
+    return click.option(
+        "--picture",
+        type=click.Path(path_type=Path, dir_okay=False),
+        metavar="FILE.png|svg",
+        callback=require_suffix(".png", ".svg"),
+        help=help,
+    )
 
 
 def page_option(command: _Command) -> _Command:
@@ -298,45 +299,39 @@ def page_option(command: _Command) -> _Command:
 
 def residual_options(command: _Command) -> _Command:
     """The residual of every reading as a table, and how warnings count."""
-    for decorate in reversed(
-        (
-            click.option(
-                "--csv",
-                "csv_to",
-                type=click.Path(path_type=Path, dir_okay=False),
-                metavar="FILE.csv",
-                callback=require_suffix(".csv"),
-                help="The residual of every reading, one row each.",
-            ),
-            click.option("--strict", is_flag=True, help="Warnings count as errors: then nothing is written."),
-        )
-    ):
-        command = decorate(command)
-    return command
+    return with_options(
+        command,
+        click.option(
+            "--csv",
+            "csv_to",
+            type=click.Path(path_type=Path, dir_okay=False),
+            metavar="FILE.csv",
+            callback=require_suffix(".csv"),
+            help="The residual of every reading, one row each.",
+        ),
+        click.option("--strict", is_flag=True, help="Warnings count as errors: then nothing is written."),
+    )
 
 
 def result_options(command: _Command) -> _Command:
     """How the result is shown."""
-    for decorate in reversed(
-        (
-            click.option(
-                "--json",
-                "json_to",
-                metavar="PATH|-",
-                callback=_json_name,
-                help="Write the machine-readable result to a .json file; - is standard output.",
-            ),
-            click.option("-q", "--quiet", is_flag=True, help="Print errors only."),
-            click.option(
-                "-v",
-                "--verbose",
-                is_flag=True,
-                help="Print with every finding what to do, and long lists in full.",
-            ),
-        )
-    ):
-        command = decorate(command)
-    return command
+    return with_options(
+        command,
+        click.option(
+            "--json",
+            "json_to",
+            metavar="PATH|-",
+            callback=_json_name,
+            help="Write the machine-readable result to a .json file; - is standard output.",
+        ),
+        click.option("-q", "--quiet", is_flag=True, help="Print errors only."),
+        click.option(
+            "-v",
+            "--verbose",
+            is_flag=True,
+            help="Print with every finding what to do, and long lists in full.",
+        ),
+    )
 
 
 class Out:

@@ -10,6 +10,7 @@ from postproc.cli.common import (
     Numbers,
     Out,
     page_option,
+    picture_option,
     readings_options,
     require_suffix,
     residual_options,
@@ -45,13 +46,7 @@ from postproc.cli.decimal_option import Decimal
     metavar="FILE.csv",
     help="Readings that are not diagnosed: the residuals of each file before and after. May be repeated.",
 )
-@click.option(
-    "--picture",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE.png|svg",
-    callback=require_suffix(".png", ".svg"),
-    help="Draw the gap per pose before and after, residual patterns, and the evidence per candidate.",
-)
+@picture_option("Draw the gap per pose before and after, residual patterns, and the evidence per candidate.")
 @page_option
 @residual_options
 @result_options

@@ -11,8 +11,8 @@ from postproc.cli.common import (
     Numbers,
     Out,
     page_option,
+    picture_option,
     readings_options,
-    require_suffix,
     residual_options,
     result_options,
 )
@@ -80,13 +80,7 @@ def _none_or(least: int) -> Callable[[click.Context, click.Parameter, int | None
     callback=_none_or(FEWEST_DRAWS),
     help="Check the intervals with so many bootstrap draws; 0 skips it [200 for few poses].",
 )
-@click.option(
-    "--picture",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE.png|svg",
-    callback=require_suffix(".png", ".svg"),
-    help="Draw the residuals by joint, direction, load and order.",
-)
+@picture_option("Draw the residuals by joint, direction, load and order.")
 @page_option
 @residual_options
 @result_options

@@ -14,6 +14,7 @@ from postproc.cli.common import (
     number,
     numbers,
     page_option,
+    picture_option,
     require_suffix,
     result_options,
 )
@@ -83,13 +84,7 @@ def _range(_context: click.Context, _option: click.Parameter, text: str) -> Numb
     type=click.IntRange(0, 7),
     help="KUKA Status (S) of the arm, the sum of 1 wrist overhead, 2 elbow up, 4 A5 below zero [2].",
 )
-@click.option(
-    "--picture",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE.png|svg",
-    callback=require_suffix(".png", ".svg"),
-    help="Draw the map; for a box, slices along z.",
-)
+@picture_option("Draw the map; for a box, slices along z.")
 @page_option
 @click.option(
     "--csv",

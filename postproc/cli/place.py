@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import click
 
 from postproc.base.units import WHOLE_TURN
-from postproc.cli.common import FAR, Out, number, page_option, require_suffix, result_options
+from postproc.cli.common import FAR, Out, number, page_option, picture_option, require_suffix, result_options
 from postproc.cli.comparison_options import comparison_options
 from postproc.cli.decimal_option import Decimal
 
@@ -78,13 +78,7 @@ def _range_option(name: str, about: str) -> Callable[[_Command], _Command]:
     metavar="FOLDER",
     help="With --spin: write the programs with other A, B, C into this folder, if it is worth it.",
 )
-@click.option(
-    "--picture",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE.png|svg",
-    callback=require_suffix(".png", ".svg"),
-    help="Draw the objective over x and y, with the present and the best place.",
-)
+@picture_option("Draw the objective over x and y, with the present and the best place.")
 @page_option
 @result_options
 def place(

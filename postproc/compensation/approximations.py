@@ -49,7 +49,7 @@ def stated_alone(task: CompensationProblem) -> CompensationProblem:
 
 
 def _with_approximation(task: CompensationProblem, distance: float) -> CompensationProblem:
-    path = replace(task.toolpath, approximation=np.nan_to_num(task.toolpath.approximation, nan=distance))
+    path = task.toolpath.with_columns(approximation=np.nan_to_num(task.toolpath.approximation, nan=distance))
     other = replace(task, toolpath=path)
     vars(other)["desired_path"] = task.desired_path  # no approximation changes it
     return other

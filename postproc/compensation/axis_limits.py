@@ -32,7 +32,7 @@ def check_limits(
 
     Reported is only what the correction adds, not what the uncorrected program does too.
     """
-    rows = np.flatnonzero(division.moved & (task.track.status[division.source] >= 0))
+    rows = np.flatnonzero(division.moved & (task.track.branch[division.source] >= 0))
     if not len(rows):
         return [], {}
     collector = _LimitFindings(task, division)
@@ -64,7 +64,7 @@ def _looked(task: CompensationProblem, division: Subdivision, rows: Ints, part: 
     share = division.share[motions]
     if (placed := task.robot_from_path(at, share)) is not None:
         flange = placed @ flange
-    q = inverse(robot.nominal, flange, task.track.status[at], task.q_reference(at, share)).q
+    q = inverse(robot.nominal, flange, task.track.branch[at], task.q_reference(at, share)).q
     speeds = _shares(task, division, motions, command.position, q)[int(more) :]
     motions, at, q = motions[int(more) :], at[int(more) :], q[int(more) :]
     low, high = robot.limits.T

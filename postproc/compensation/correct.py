@@ -23,7 +23,8 @@ from postproc.compensation.cuts import (
 from postproc.compensation.mirror import Correction, pose_error
 from postproc.compensation.problem import CompensationProblem
 from postproc.robot.axis_track import is_near_singular, singular_words
-from postproc.robot.stated_branches import changed_sides, mismatch_words
+from postproc.robot.makers import maker_of
+from postproc.robot.stated_branches import stated_changes
 from postproc.toolpath import Kind
 
 
@@ -96,7 +97,7 @@ def correct(task: CompensationProblem) -> CorrectionResult:
         why.setdefault(int(row), _at(task, int(row), "COR004", "COMPENSATE is switched inside this cut"))
 
     # What the force does, everywhere it can be predicted; the correction, where it may be made.
-    predictable = np.flatnonzero(scope & cartesian & (track.status >= 0) & track.reachable)
+    predictable = np.flatnonzero(scope & cartesian & (track.branch >= 0) & track.reachable)
     may = on & ~spread_over_cuts(_in(why, n), cut) & task.deflects
     corrections = _Findings(n)
     for block in in_blocks(
@@ -241,9 +242,8 @@ def _correct_block(task: CompensationProblem, rows: Ints, may: Bools) -> _Correc
     low, high = robot.limits.T
     crossed = other_quadrant = path.configuration.stated[tried]
     if crossed.any():
-        sides = changed_sides(robot, path.configuration.of(tried), task.track.q[tried], done.q)
-        other_quadrant = sides["quadrants"]
-        crossed = (sides["status"] | sides["turn"] | sides["revolutions"]) & (path.kind[tried] == Kind.PTP)
+        sides = stated_changes(robot, path.configuration.of(tried), task.track.q[tried], done.q)
+        crossed, other_quadrant = sides.crossed & (path.kind[tried] == Kind.PTP), sides.other_quadrant
     return _CorrectedBlock(
         rows,
         shift,
@@ -311,7 +311,7 @@ class _Findings:
             "COR001": "the correction does not converge",
             "COR008": "the corrected pose exceeds the limits: "
             + (_axis_beyond(task, self.axes[0]) if len(self.axes) else ""),
-            "KIN006": mismatch_words(task.toolpath.configuration),
+            "KIN006": maker_of(task.toolpath.configuration).mismatch_message,
         }
         for code, parts in self.failed.items():
             rows = np.concatenate(parts)
@@ -321,9 +321,7 @@ class _Findings:
         """Quadrants are verbatim in the text: the axes of the corrected pose should still be in them."""
         rows = np.array([row for row in self.other_quadrant if keeps[row]], np.int64)
         if len(rows):
-            message = (
-                "the corrected pose is in another quadrant of axis 1, 4 or 6 than cf1, cf4 and cf6 state"
-            )
+            message = maker_of(task.toolpath.configuration).quadrant_message
             findings.append(_at(task, int(rows[0]), "KIN013", message + _further_findings(task, rows)))
 
 
@@ -344,13 +342,13 @@ def _uncorrectable(
             why.setdefault(row, _at(task, row, "FRC005", message))
     free = tried & cartesian & ~_in(why, n)
     # what no state before it settles on every path is no mistake of the cell
-    late = np.maximum.accumulate(~path.continues) & free & (track.status < 0)
+    late = np.maximum.accumulate(~path.continues) & free & (track.branch < 0)
     message = "the robot's configuration differs with the path of the program that leads here"
     _note(task, why, findings, np.flatnonzero(late), "KIN004", message)
     free &= ~late
     _refuse(
         task,
-        free & (track.status < 0),
+        free & (track.branch < 0),
         "KIN004",
         "the robot's configuration is not known here",
         "add `start:` (axes before the first motion) to the cell, or state S and T in the PTP before it",

@@ -100,7 +100,7 @@ def error_sensitivities(
         command, wrench = placed @ command, rotate_wrench(placed, wrench)
         axes = placed.rotation @ axes
     given = task.conditions_at(rows, corrected=corrected)
-    here = predict(model, command, LoadCase(tool, wrench, given, task.track.status[rows], task.track.q[rows]))
+    here = predict(model, command, LoadCase(tool, wrench, given, task.track.branch[rows], task.track.q[rows]))
     moves = sensitivities(model, entries, here.q, wrench, tool, given, here.displacement, axes)
     moves -= goal_sensitivities(task, entries, rows, wanted)
     goal = task.goal(rows, wanted)

@@ -15,14 +15,14 @@ class LoadCase:
     """Of N poses of the tool.
 
     tool: TCP on the flange (N), or one pose for all; wrench (N, 6) [N, N m] on the tool at the TCP, robot base axes;
-    conditions: what else is known of N states; status (N,): the branch of the inverse kinematics; q_reference (N, n)
+    conditions: what else is known of N states; branch (N,): that of the inverse kinematics; q_reference (N, n)
     [rad, m]: joint values by which the turns are chosen.
     """
 
     tool: Poses
     wrench: Floats
     conditions: Conditions
-    status: Ints
+    branch: Ints
     q_reference: Floats
 
     def part(self, rows: Any) -> LoadCase:
@@ -31,6 +31,6 @@ class LoadCase:
             self.tool if self.tool.position.ndim == 1 else self.tool[rows],
             self.wrench[rows],
             self.conditions.part(rows),
-            self.status[rows],
+            self.branch[rows],
             self.q_reference[rows],
         )

@@ -60,7 +60,7 @@ def predict(
     if q is not None:
         solution = Inverse(q, np.asarray(np.isfinite(q).all(axis=1)))
     else:
-        solution = inverse(model.robot.nominal, command @ case.tool.inverse(), case.status, case.q_reference)
+        solution = inverse(model.robot.nominal, command @ case.tool.inverse(), case.branch, case.q_reference)
     rest = model.equilibrium(solution.q, case.wrench, case.tool, case.conditions, start, REST)
     return Prediction(rest.pose, solution.q, rest.displacement, solution.reachable, rest.converged)
 
@@ -184,7 +184,7 @@ def initial_guess(
     deflected there (N, m) [rad, m], in the load case ``case`` (N); the wanted pose where that is out of reach, or more
     than ``farthest`` [m] away.  ``q`` (N, n) [rad, m]: motors at the goal, where they are known."""
     if q is None:
-        q = inverse(model.robot.nominal, goal @ case.tool.inverse(), case.status, case.q_reference).q
+        q = inverse(model.robot.nominal, goal @ case.tool.inverse(), case.branch, case.q_reference).q
     known = np.asarray(np.isfinite(q).all(axis=1))
     joints = q if known.all() else np.where(known[:, None], q, case.q_reference)
     motors, displacement = model.inverse_equilibrium(joints, case.wrench, case.tool, case.conditions)

@@ -101,7 +101,7 @@ class CompensationProblem:
     ) -> LoadCase:
         """Motions ``rows`` (K,) at the shares (K,) of their paths; ``wrench`` (K, 6) in the robot's own axes."""
         return LoadCase(
-            self.tool.shared(rows), wrench, conditions, self.track.status[rows], self.q_reference(rows, share)
+            self.tool.shared(rows), wrench, conditions, self.track.branch[rows], self.q_reference(rows, share)
         )
 
     @cached_property

@@ -49,7 +49,7 @@ def add_force_ramps(
     task = _limit_profiles(task)
     rows = task.force.inner_steps
     known = task.desired_path.traceable[rows] & task.toolpath.known[rows - 1]
-    known &= (task.track.status[rows] >= 0) & task.track.reachable[rows] & task.track.reachable[rows - 1]
+    known &= (task.track.branch[rows] >= 0) & task.track.reachable[rows] & task.track.reachable[rows - 1]
     known &= task.toolpath.tool[rows] == task.toolpath.tool[rows - 1]
     away = np.abs(task.force.start[rows] - task.force.values[rows - 1]).max(axis=1, initial=0.0)
     rows = rows[known & (away > SAME * max(1.0, task.force.max_force))]

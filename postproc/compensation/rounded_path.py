@@ -289,7 +289,7 @@ def _sides_of_output(task: CompensationProblem, division: Subdivision) -> GapSid
     stations = Stations(motion, share, lost.row, lost.share, motor, lost.restart)
     near = stations.crossing(lost)
     near = near[(near >= 0) & (near < len(division))]
-    moved = task.desired_path.traceable & (task.desired_path.length > 0) & (task.track.status >= 0)
+    moved = task.desired_path.traceable & (task.desired_path.length > 0) & (task.track.branch >= 0)
     if task.process:
         moved &= task.carries
     near = near[moved[source[near]] & ~division.transitions[near]]

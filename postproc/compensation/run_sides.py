@@ -94,5 +94,5 @@ def axes_at(task: CompensationProblem, row: Ints, along: Floats, command: Poses,
     flange = command @ task.tool.shared(row).inverse()
     if (placed := task.robot_from_path(row, along)) is not None:
         flange = placed @ flange
-    solution = inverse(task.model.robot.nominal, flange, task.track.status[row], near)
+    solution = inverse(task.model.robot.nominal, flange, task.track.branch[row], near)
     return np.where(solution.reachable[:, None], solution.q, np.nan)

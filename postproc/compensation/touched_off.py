@@ -86,7 +86,7 @@ class TouchedOff:
         if model.by_direction:
             given = replace(given, direction=np.zeros((len(row), len(model.robot.joints))))
         none = np.zeros((len(row), 6))
-        real = predict(model, wanted, LoadCase(tool, none, given, track.status[row], track.q[row]))
+        real = predict(model, wanted, LoadCase(tool, none, given, track.branch[row], track.q[row]))
         rotation, position = np.tile(np.eye(3), (frames, 1, 1)), np.zeros((frames, 3))
         known = np.isin(np.arange(frames), frame)
         for index in np.flatnonzero(known):

@@ -69,7 +69,7 @@ def _can_lead(motions: DivisibleMotions, rows: Ints) -> Bools:
     # without a force it may be corrected for what the robot does by itself
     in_air = (MotionOutcome.AIR,) if motions.task.process else (MotionOutcome.AIR, MotionOutcome.CORRECTED)
     can &= np.isin(motions.full.state[before], in_air) & ~motions.task.carries[before]
-    can &= feed_motions(path)[before] & (motions.task.track.status[before] >= 0)
+    can &= feed_motions(path)[before] & (motions.task.track.branch[before] >= 0)
     can &= (path.tool[before] == path.tool[rows]) & (
         path.constraints.orientation_programmed[before] == path.constraints.orientation_programmed[rows]
     )

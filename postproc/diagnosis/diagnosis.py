@@ -10,15 +10,16 @@ import numpy as np
 from postproc.base.findings import Finding, Refusal
 from postproc.diagnosis.agreement import AGREES, largest_disagreement, without_effects
 from postproc.diagnosis.candidate_fits import with_effects
-from postproc.diagnosis.candidates import Candidate
+from postproc.diagnosis.candidates import EVERY, Candidate
 from postproc.diagnosis.equivalent_models import cover_equivalent_models
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
 from postproc.diagnosis.sample import sample_of
 from postproc.diagnosis.search import model_unknowns, search
-from postproc.diagnosis.search_result import Search
+from postproc.diagnosis.search_result import Key, Search
 from postproc.diagnosis.unmoved_parameters import restore_unmoved_parameters
 from postproc.diagnosis.unstated_geometry import take_in_unstated_geometry
 from postproc.diagnosis.verdict import (
+    AS_WELL,
     ONLY_TOGETHER,
     OTHER_COURSE,
     SIZE_UNDETERMINED,
@@ -85,7 +86,7 @@ def diagnose(
         # of what has no form that is known others would only be imitations
         if not verdict.rejected or any(why == OTHER_COURSE for _, why in verdict.rejected):
             break
-        result = search(sample, base, [candidate.key for candidate, _ in rejected])
+        result = search(sample, base, _banned(rejected))
         verdict = judge(result)
         rejected += verdict.rejected
     if sample is not campaign:
@@ -142,6 +143,12 @@ def diagnose(
     verdict = replace(verdict, rejected=tuple(rejected), refitted=moved)
     where = residual_patterns(stated, result.confirmed)
     return Diagnosis(stated, where, result, verdict, final, base, disagreement, agreed, clear_is_better)
+
+
+def _banned(rejected: Sequence[tuple[Candidate, str]]) -> list[Key]:
+    """Keys of what did not hold; where another course over its joint does as well, nor does it as one of all joints."""
+    keys = [candidate.key for candidate, _ in rejected]
+    return keys + [(candidate.key[0], EVERY) for candidate, why in rejected if why == AS_WELL]
 
 
 def _squares(fitted: Fit, weights: Weighting) -> float:

@@ -71,7 +71,7 @@ class Alternative:
 
     @property
     def priced(self) -> float:
-        """By how much it is the lesser one to go on with: of twins that with fewer parameters."""
+        """The margin with twins ranked too: of them the one with fewer parameters is the better."""
         return self.worse + self.more
 
     @property

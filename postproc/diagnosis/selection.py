@@ -243,21 +243,45 @@ def selected(
 ) -> Explained:
     """Groups taken in one by one from ``start`` on, the one with the best evidence first, exchanged and left out again
     as long as that is better.  A group stays if by chance, among all ``candidates``, its gain has a probability below
-    ``CHANCE``."""
-    now = _pruned(problem, explained(problem, start), len(candidates))
+    ``CHANCE``.
+
+    A group of several columns that was the best by itself may be a sum of others: without it, and grown again from
+    what else was chosen, the choice may explain as much with fewer columns.
+    """
+    now = _grown(problem, explained(problem, start), candidates, candidates, limit)
+    for gone in now.groups:
+        if gone not in now.groups or len(problem.places[gone]) < 2:
+            continue
+        rest, others = [g for g in now.groups if g != gone], [g for g in candidates if g != gone]
+        instead = _grown(problem, explained(problem, rest), others, candidates, limit)
+        variance, penalty = scatter(problem, now), np.log(problem.freedom)
+        if _score(instead, variance, penalty) < _score(now, variance, penalty) - 1.0:
+            now = instead
+    return now
+
+
+def _grown(
+    problem: Problem, start: Explained, others: Sequence[int], candidates: Sequence[int], limit: int
+) -> Explained:
+    """``start`` and what of ``others`` counts beside it, for as many ``candidates`` tried."""
+    now = _pruned(problem, start, len(candidates))
     penalty = np.log(problem.freedom)
     for _ in range(limit):
-        tried = [(explained(problem, (*now.groups, g)), g) for g in candidates if g not in now.groups]
+        tried = [(explained(problem, (*now.groups, g)), g) for g in others if g not in now.groups]
         if not tried:
             break
-        best = min(tried, key=lambda pair: pair[0].squares / _least(problem, tried) + penalty * pair[0].rank)[
-            0
-        ]
+        least = _least(problem, tried)
+        best = min(tried, key=lambda pair: _score(pair[0], least, penalty))[0]
         if not counts(problem, now, best, len(candidates)):
             break
-        now = _exchanged(problem, best, candidates, penalty)
+        now = _exchanged(problem, best, others, penalty)
         now = _pruned(problem, now, len(candidates))
     return now
+
+
+def _score(one: Explained, variance: float, penalty: float) -> float:
+    """-2 ln(likelihood) with scatter of ``variance``, up to a constant, and what each column costs."""
+    return one.squares / variance + penalty * one.rank
 
 
 def _least(problem: Problem, tried: Sequence[tuple[Explained, int]]) -> float:
@@ -290,10 +314,7 @@ def _exchanged(problem: Problem, now: Explained, candidates: Sequence[int], pena
             if g in now.groups:
                 continue
             other = explained(problem, (*rest, g))
-            if (
-                other.squares / variance + penalty * other.rank
-                < best.squares / variance + penalty * best.rank - 1.0
-            ):
+            if _score(other, variance, penalty) < _score(best, variance, penalty) - 1.0:
                 best = other
     return best
 

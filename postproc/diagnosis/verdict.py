@@ -79,6 +79,7 @@ NOT_ENOUGH = "too much would remain for a name"
 AS_WELL = "another course over the same joint explains as much, and more remains than scatter"
 OTHER_COURSE = "the readings follow another course than that of this effect"
 PART_OF_COURSE = "what it would explain is a part of that other course"
+TWO_LAWS = "it fits only beside another law of lost motion on the same joint, and more remains than scatter"
 ONLY_TOGETHER = "it fits only beside an effect that the readings cannot distinguish from others"
 SIZE_UNDETERMINED = "it would have to be unusually large, and the readings hardly determine its size"
 
@@ -181,6 +182,13 @@ def judge(search: Search) -> Verdict:
     bare, _ = reduced_chi2_of(search, explained(linear.problem, ()))
     # two forms of one effect on one joint do not make its name uncertain
     sets = tuple(a for a in aliases if len({(c.name, c.joint) for c in a}) > 1)
+    if unexplained:
+        doubled = _on_one_joint([one.candidate for one in named])
+        rejected += [(one.candidate, TWO_LAWS) for one in named if one.candidate in doubled]
+        kept = [k for k, one in enumerate(named) if one.candidate not in doubled]
+        named, aliases = [named[k] for k in kept], [aliases[k] for k in kept]
+        groups = [groups[k] for k in kept]
+        sets = tuple(a for a in aliases if len({(c.name, c.joint) for c in a}) > 1)
     formless = any(why == OTHER_COURSE for _, why in rejected)
     if formless:
         # a zero of the joint that follows another course may be a part of that course
@@ -228,6 +236,13 @@ def judge(search: Search) -> Verdict:
         tuple(rejected),
         patterns,
     )
+
+
+def _on_one_joint(several: Sequence[Candidate]) -> list[Candidate]:
+    """Those that depend on the side of approach and are not alone with that on their joint: two such laws together look
+    like a third."""
+    lost = [c for c in several if c.effect.by_direction]
+    return [c for c in lost if sum(c.joint == other.joint for other in lost) > 1]
 
 
 def _explained_share(variance: float, bare: float, known: bool) -> float:

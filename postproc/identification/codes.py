@@ -86,7 +86,7 @@ CODES = define(
             "warning",
             "reflector mounted again",
             meaning="Between two sessions a reflector was at different places of the tool.",
-            consequence="It counts as another reflector in each session, so that the robot is not blamed for it.",
+            consequence="It counts as another reflector in each session; its place is no error of the robot.",
             action="Give reflectors that were mounted again other names.",
             example="A nest that was taken off over night.",
         ),

@@ -1,5 +1,5 @@
 """Reflectors that were mounted again between sessions, and a tracker that was moved within one: what readings show of
-how they were taken, before a robot is blamed for it."""
+how they were taken, before it counts as an error of the robot."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from postproc.measurements import Readings
 from postproc.model import StiffnessModel
 
 LEFT = 0.5
-"""Share of the residual, root mean square, that a tracker or targets elsewhere must leave at most to be blamed."""
+"""Share of the residual, root mean square, that a tracker or targets elsewhere must leave at most to be reported."""
 
 CLEAR = 5.0
 """Times what then remains that they must have moved by."""

@@ -20,7 +20,7 @@ MANY = 2000
 """Readings from which on a fold that is left out hardly moves a fit."""
 
 OTHER_STATION = 3.0
-"""A registration that leaves so many times more than one of its own does not hold for other readings."""
+"""A registration that leaves so many times more than one of its own is not valid for other readings."""
 
 WIDER = 1.4
 """Ratio of a bootstrap's interval to the one by covariance from which on it is worth telling."""

@@ -8,6 +8,8 @@ from postproc.base.findings import Finding, Refusal
 from postproc.languages import codes as codes
 from postproc.languages.dialect import Dialect
 from postproc.languages.gcode import DIALECTS as GCODE
+from postproc.languages.gcode.cell_options import OPTIONS as GCODE_OPTIONS
+from postproc.languages.krl import OPTIONS as KRL_OPTIONS
 from postproc.languages.krl import KrlDialect
 from postproc.languages.rapid import RapidDialect
 from postproc.languages.tp import TpDialect
@@ -16,6 +18,9 @@ DIALECTS: dict[str, Dialect] = {
     dialect.name: dialect for dialect in (TpDialect(), RapidDialect(), *GCODE, KrlDialect())
 }
 """Name -> dialect; the first that claims a file reads it."""
+
+DIALECT_OPTIONS = (*GCODE_OPTIONS, *KRL_OPTIONS)
+"""What a cell may state in its ``dialect`` section beside the name."""
 
 COMPANION_SUFFIXES = tuple(sorted({suffix for one in DIALECTS.values() for suffix in one.companion_suffixes}))
 """Of files that belong to the program whose name they bear."""

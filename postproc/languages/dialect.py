@@ -55,14 +55,27 @@ class Program:
     edit_syntax: EditSyntax = EditSyntax()
 
 
+@dataclass(frozen=True)
+class DialectOption:
+    """What a cell may state for the reader of a language.
+
+    ``key``: in the cell's ``dialect`` section; ``about``: what it means, in a line; ``choices``: its values, any text
+    without; ``is_file``: it names a file that is read and never written (see ``ReadingSettings.references``).
+    """
+
+    key: str
+    about: str
+    choices: tuple[str, ...] = ()
+    is_file: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class ReadingSettings:
     """What a program does not say of itself.
 
     orientation (3,): A, B, C [rad] of the tool in the base where the language programs no orientation, and what the
-    spin about the tool axis is measured from; None where nothing states it.  integer_words: what X10 means where a
-    control may count in increments, "mm" or "um", "" where nothing states it.  references: files that are read and
-    never written ($config.dat).
+    spin about the tool axis is measured from; None where nothing states it.  options: key of a ``DialectOption`` -> its
+    value, where one is stated.  references: files that are read and never written.
     siblings: files that lie beside the program or above it and say what it does not say itself, read like these.
     symbols: name that only the controller knows (capitals) -> its value, mm and deg where it is a pose; initial: the
     state at the first statement.
@@ -70,7 +83,7 @@ class ReadingSettings:
     """
 
     orientation: Floats | None = None
-    integer_words: str = ""
+    options: Mapping[str, str] = field(default_factory=dict)
     references: tuple[Document, ...] = ()
     siblings: tuple[Document, ...] = ()
     symbols: Mapping[str, Symbol] = field(default_factory=dict)

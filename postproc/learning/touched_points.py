@@ -131,10 +131,10 @@ def touched_points(
     tool = task.tool[row]
     lever = turned(np.swapaxes(wanted.rotation, 1, 2), point - wanted.position)
     contact = Poses(tool.rotation, tool.position + turned(tool.rotation, lever))
-    reference, status = task.q_reference(row, along), task.track.status[row]
+    reference, branch = task.q_reference(row, along), task.track.branch[row]
     nominal, back = task.model.robot.nominal, tool.inverse()
-    found = inverse(nominal, sent @ back, status, reference)
-    goal = found if command is None else inverse(nominal, wanted @ back, status, reference)
+    found = inverse(nominal, sent @ back, branch, reference)
+    goal = found if command is None else inverse(nominal, wanted @ back, branch, reference)
     return TouchedPoints(
         row=row,
         share=along,

@@ -9,7 +9,7 @@ from postproc.base.arrays import Floats
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses
 from postproc.effects import Conditions, Effect
-from postproc.model.cartesian import compute_cartesian_compliance, compute_linear_deflection
+from postproc.model.cartesian import compute_linear_deflection
 from postproc.model.files import label_parameters, read_covariance, read_terms, select_covariance
 from postproc.model.mechanics import NOTHING, EffectInstance, Mechanics
 from postproc.model.plausibility import find_implausible
@@ -91,17 +91,6 @@ class StiffnessModel(Mechanics):
         """Deflection twists (N, 6) [m, rad] of the TCP by eq. (5), linearized at ``q`` (N, n): J K_theta^-1 J^T w, w
         the ``wrench`` (N, 6) [N, N m]."""
         return compute_linear_deflection(self, q, wrench, tool, conditions)
-
-    def cartesian_compliance(
-        self, q: Floats, wrench: Floats | None, tool: Poses, conditions: Conditions = NOTHING
-    ) -> Floats:
-        """Change of the TCP's pose with a small wrench, (N, 6, 6) [m/N, rad/(N m), ...], at ``q`` (N, n) [rad, m];
-        robot base axes.
-
-        Unloaded (``wrench`` None): J K_theta^-1 J^T, the inverse of eq. (5).  Loaded: at the equilibrium under
-        ``wrench`` (N, 6), with the geometric stiffness: J (1 - C H)^-1 C J^T, H = d(J^T w + loads)/d(coordinates).
-        """
-        return compute_cartesian_compliance(self, q, wrench, tool, conditions)
 
     def sensitivity(
         self,

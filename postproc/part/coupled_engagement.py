@@ -103,6 +103,49 @@ class CoupledEngagement:
         return float(lengths(self.wrench[:, :3]).max(initial=0.0))
 
 
+class PlacedPieces(NamedTuple):
+    """P pieces of sweeps in their order, and the K places at their ends.
+
+    rows (P, ROW), owner (P,): whose sweep each is a part of; motion (P,), share (P, 2): of the path of the motion;
+    fresh (P,): the piece does not start where the one before ends; start, end (P,): its places; at_motion, at_share
+    (K,): of the places.
+    """
+
+    rows: Floats
+    owner: Ints
+    motion: Ints
+    share: Floats
+    fresh: Bools
+    start: Ints
+    end: Ints
+    at_motion: Ints
+    at_share: Floats
+
+    @staticmethod
+    def of(paths: Paths, rows: Floats, owner: Ints, part: Floats) -> PlacedPieces:
+        """Pieces ``rows`` (P, ROW) of the sweeps ``owner`` (P,), from and to the shares ``part`` (P, 2) of these."""
+        motion, whole = paths.motion[owner], paths.share[owner]
+        share = whole[:, :1] + part * (whole[:, 1:] - whole[:, :1])
+        fresh = _starts(rows, motion, share)
+        # a place at the end of every piece, and one at the start of those that are fresh
+        end = np.cumsum(fresh + 1) - 1
+        start = np.where(fresh, end - 1, np.append(0, end[:-1]))
+        count = int(end[-1]) + 1
+        at_motion, at_share = np.zeros(count, np.int64), np.zeros(count)
+        at_motion[end], at_share[end] = motion, share[:, 1]
+        at_motion[start[fresh]], at_share[start[fresh]] = motion[fresh], share[fresh, 0]
+        return PlacedPieces(rows, owner, motion, share, fresh, start, end, at_motion, at_share)
+
+
+class Expected(NamedTuple):
+    """Displacements (K, 6) near which the solution is looked for, by how far it may be from them [m], and whether (1 or
+    0) the wrenches of the nodes are near it, as of ``Pieces``."""
+
+    displacement: Floats
+    slack: float
+    known: int
+
+
 def solve_coupled(
     run: StockRun, paths: Paths, displaced: Displacements, lever: float
 ) -> CoupledEngagement | str:
@@ -111,16 +154,9 @@ def solve_coupled(
     rows, owner, part = _pieces(run, paths, displaced.division)
     if len(rows) > MOST_PIECES:
         return f"the program has {len(rows)} places to solve, at most {MOST_PIECES} are"
-    motion, whole = paths.motion[owner], paths.share[owner]
-    share = whole[:, :1] + part * (whole[:, 1:] - whole[:, :1])
-    fresh = _starts(rows, motion, share)
-    # a place at the end of every piece, and one at the start of those that are fresh
-    first = np.cumsum(fresh + 1) - 1
-    end, start = first, np.where(fresh, first - 1, np.append(0, first[:-1]))
-    count = int(first[-1]) + 1
-    at_motion, at_share = np.zeros(count, np.int64), np.zeros(count)
-    at_motion[end], at_share[end] = motion, share[:, 1]
-    at_motion[start[fresh]], at_share[start[fresh]] = motion[fresh], share[fresh, 0]
+    pieces = PlacedPieces.of(paths, rows, owner, part)
+    at_motion, at_share = pieces.at_motion, pieces.at_share
+    count = len(at_motion)
 
     wrench, to_stock = task.force.along(at_motion, at_share), displaced.to_stock(at_motion)
     # a correction brings the tool near to the nominal engagement, whose wrenches these are
@@ -133,7 +169,7 @@ def solve_coupled(
         for attempt in range(_ATTEMPTS):
             listed = base + np.einsum("kij,kj->ki", slope, guess)
             solved = Nodes(base, slope, np.ascontiguousarray(guess), np.zeros(count), np.zeros(count))
-            _solve(run, paths, (rows, owner), (start, end, fresh), solved, listed, slack, lever, known)
+            _solve(run, paths, pieces, solved, Expected(listed, slack, known), lever)
             guess, known = solved.wrench, 1
             moved = base + np.einsum("kij,kj->ki", slope, guess)
             if _farthest(moved - listed, lever) <= slack:
@@ -145,10 +181,10 @@ def solve_coupled(
         if _farthest(exact - moved, lever) <= ENOUGH:
             break
     assert solved is not None
-    key, wrench, area = _by_motion(at_motion, at_share, wrench, solved.area, motion, share, fresh, start)
-    pieces = Paths(rows, motion, share, paths.which[owner], paths.number[owner])
+    key, wrench, area = _by_motion(pieces, wrench, solved.area)
+    swept = Paths(rows, pieces.motion, pieces.share, paths.which[owner], paths.number[owner])
     unsettled = np.unique(at_motion[solved.residual > UNSETTLED])
-    return CoupledEngagement(key, wrench, area, float(solved.residual.max()), pieces, unsettled)
+    return CoupledEngagement(key, wrench, area, float(solved.residual.max()), swept, unsettled)
 
 
 def _pieces(run: StockRun, paths: Paths, division: Subdivision | None) -> tuple[Floats, Ints, Floats]:
@@ -300,27 +336,19 @@ def _farthest(moved: Floats, lever: float) -> float:
 
 
 def _solve(
-    run: StockRun,
-    paths: Paths,
-    pieces: tuple[Floats, Ints],
-    places: tuple[Ints, Ints, Bools],
-    nodes: Nodes,
-    listed: Floats,
-    slack: float,
-    lever: float,
-    known: int,
+    run: StockRun, paths: Paths, pieces: PlacedPieces, nodes: Nodes, expected: Expected, lever: float
 ) -> None:
-    """``nodes`` solved, near the displacements ``listed`` (K, 6); places: start, end and fresh of ``Pieces``."""
-    rows, owner = pieces
+    """``nodes`` solved, near what is ``expected``."""
+    rows, start, end = pieces.rows, pieces.start, pieces.end
     sweeps, before = run.sweeps, run.before
     cutters = run.engagement.stock.cutters
     earlier = np.zeros((0, ROW)) if before is None else run.engagement.stock.sweeps[: len(before.rows)]
-    start, end, fresh = places
     whole = np.broadcast_to([0.0, 1.0], (len(rows), 2))
+    listed = expected.displacement
     near = displaced_rows(rows, whole, listed[start], listed[end], lever, AS_STRAIGHT)
     every = np.ascontiguousarray(np.concatenate([earlier, near]))
-    stock, live = build_stock(run.blank, every, cutters, slack=slack)
-    number = paths.number[owner]
+    stock, live = build_stock(run.blank, every, cutters, slack=expected.slack)
+    number = paths.number[pieces.owner]
     laws = laws_of(sweeps, run.toolpath, run.process.edges)[number]
     solve_pieces(
         stock,
@@ -332,22 +360,22 @@ def _solve(
             np.ascontiguousarray(sweeps.heading[number]),
             start.astype(np.int64),
             end.astype(np.int64),
-            fresh.astype(np.int64),
+            pieces.fresh.astype(np.int64),
             len(earlier),
-            known,
+            expected.known,
         ),
         nodes,
         lever,
     )
 
 
-def _by_motion(
-    at_motion: Ints, at_share: Floats, wrench: Floats, area: Floats, motion: Ints, share: Floats, fresh: Bools,
-    start: Ints,
-) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+def _by_motion(pieces: PlacedPieces, wrench: Floats, area: Floats) -> tuple[Floats, Floats, Floats]:
     """Keys, wrenches and areas of the places, with the start of motions that go on from the one before."""
-    more = np.flatnonzero(~fresh & np.append(True, motion[1:] != motion[:-1]))
-    key = np.concatenate([2.0 * at_motion + at_share, 2.0 * motion[more] + share[more, 0]])
+    motion = pieces.motion
+    more = np.flatnonzero(~pieces.fresh & np.append(True, motion[1:] != motion[:-1]))
+    key = np.concatenate(
+        [2.0 * pieces.at_motion + pieces.at_share, 2.0 * motion[more] + pieces.share[more, 0]]
+    )
     order = np.argsort(key, kind="stable")
-    index = np.concatenate([np.arange(len(at_motion)), start[more]])[order]
+    index = np.concatenate([np.arange(len(pieces.at_motion)), pieces.start[more]])[order]
     return key[order], wrench[index], area[index]

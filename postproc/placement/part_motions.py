@@ -22,7 +22,7 @@ class PartMotions:
     program, line, row (R,): whose they are; share (R,): of the motion's path, 1 at its end.
     target: TCP in $WORLD, ``moves`` (R,): with the part; tool: TCP on the flange;
     axis (R, 3): about which the tool is turned, tool axes, zero for a tool that is not; before: $WORLD in the robot's
-    own base; track (3,): by how much that moves with each metre of a track that is not a joint.  status (R,) branch, q
+    own base; track (3,): by how much that moves with each metre of a track that is not a joint.  branch (R,), q
     (R, n) [rad, m] joint values now.  head (R,): the place by which the turns of A1, A4 and A6 are chosen; anchor (R,
     n) [rad, m]: joint values before a head that goes on from axis positions, NaN where its T chooses; sign (R, n): of
     each axis as T states it, 0 without.  scored (R,): ends of motions under force, under_force (R,): places of such
@@ -40,7 +40,7 @@ class PartMotions:
     tool: Poses
     axis: Floats
     before: Poses
-    status: Ints
+    branch: Ints
     q: Floats
     head: Ints
     anchor: Floats

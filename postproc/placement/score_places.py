@@ -153,7 +153,7 @@ def joint_margins(
     near = np.tile(motions.q, (count, 1))
     if motions.track_joint is not None:
         near[:, motions.track_joint] = np.repeat(places[:, TRACK], rows)
-    solution = inverse(robot.nominal, motions.flanges(places), np.tile(motions.status, count), near)
+    solution = inverse(robot.nominal, motions.flanges(places), np.tile(motions.branch, count), near)
     reached = solution.reachable.reshape(count, rows)
     q = np.where(solution.reachable[:, None], solution.q, near).reshape(count, rows, -1)
     _choose_turns(motions, q)

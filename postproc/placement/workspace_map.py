@@ -11,6 +11,7 @@ from postproc.base.arrays import Bools, Floats
 from postproc.base.geometry import Poses
 from postproc.effects.gravity_compensator import GravityCompensator
 from postproc.model import StiffnessModel
+from postproc.robot.branches import BranchBit
 from postproc.robot.inverse import inverse
 
 MAX_CELLS = 1_000_000
@@ -44,7 +45,7 @@ class WorkspaceGrid:
 @dataclass(frozen=True)
 class MapLoad:
     """What is asked at every cell.  ``tool``: TCP on the flange; ``orientation`` (3, 3) of the tool in the robot
-    base; ``wrench`` (6,) [N, N m] at the TCP, robot base axes; ``status``: branch S of the arm.
+    base; ``wrench`` (6,) [N, N m] at the TCP, robot base axes; ``branch``: that of the arm, see ``BranchBit``.
 
     ``linear``: eq. (5), linearized at the unloaded pose, in place of the balance on the deflected one.
     """
@@ -52,7 +53,7 @@ class MapLoad:
     tool: Poses
     orientation: Floats
     wrench: Floats
-    status: int = 0b010
+    branch: int = BranchBit.ELBOW
     linear: bool = False
     ignore_limits: bool = False
 
@@ -143,7 +144,7 @@ def _arm(model: StiffnessModel, places: Floats, load: MapLoad) -> tuple[Floats, 
     low, high = robot.limits.T
     middle = np.nan_to_num((low + high) / 2)
     solution = inverse(
-        robot.nominal, flange, np.full(count, load.status), np.broadcast_to(middle, (count, len(middle)))
+        robot.nominal, flange, np.full(count, load.branch), np.broadcast_to(middle, (count, len(middle)))
     )
     inside = ((solution.q >= low - MARGIN) & (solution.q <= high + MARGIN)).all(axis=1)
     return solution.q, solution.reachable, solution.reachable & inside

@@ -28,9 +28,9 @@ from postproc.robot.half_turns import (
     signed,
     turn_senses,
 )
-from postproc.robot.inverse import controller_values, inverse, kuka_angles, status_of
+from postproc.robot.inverse import branch_of, controller_values, inverse, kuka_angles
+from postproc.robot.makers import SIGN_MARGIN, maker_of
 from postproc.robot.newton import follow_rows, weakest
-from postproc.robot.stated_branches import SIGN_MARGIN, stated_branches, turns_match
 from postproc.toolpath import Kind, Toolpath
 
 WEAK = 0.004
@@ -40,12 +40,12 @@ marks about as many states of a KR 270 as the places of its closed form do."""
 
 @dataclass(frozen=True)
 class AxisTrack:
-    """q (N, n) [rad, m], NaN where unknown or out of reach; status (N,) branch taken (0 for an arm that is not KUKA's),
-    -1 where nothing states it; reachable (N,); within (N,) inside of the axis limits; turn_matches (N,) the stated T is
-    that of ``q``; half_turns: path motions that turn the tool by half a turn, and in which sense."""
+    """q (N, n) [rad, m], NaN where unknown or out of reach; branch (N,) that is taken (see ``BranchBit``),
+    -1 where nothing states it; reachable (N,); within (N,) inside of the axis limits; turn_matches (N,) the stated
+    turns are those of ``q``; half_turns: path motions that turn the tool by half a turn, and in which sense."""
 
     q: Floats
-    status: Ints
+    branch: Ints
     reachable: Bools
     within: Bools
     turn_matches: Bools
@@ -64,11 +64,11 @@ def follow_axes(
     values before the first motion, if known.  An external joint is where the program has it (see ``external_joint``).
     ``base``, ``tool`` (N): frames of the motions, in the robot base and on the flange, where there are any.
 
-    KUKA-type arms: a PTP takes the branch of its S and the turns of its T; without them the branch stays and each axis
-    takes the shorter turn.  On path motions the branch stays and the axes follow the path (see ``HalfTurns``).  After a
-    PTP to an unknown target the branch is unknown until something states it.
+    Arms of closed form: a PTP takes the branch and the turns that it states; without them the branch stays and each
+    axis takes the shorter turn.  On path motions the branch stays and the axes follow the path (see ``HalfTurns``).
+    After a PTP to an unknown target the branch is unknown until something states it.
 
-    Other arms have no S and T.  Each motion is solved from the one before it (see ``newton.follow_rows``), so branch
+    Other arms have no branches.  Each motion is solved from the one before it (see ``newton.follow_rows``), so branch
     and turns are those that lead on from ``start`` or from the last axis motion; only a PTP may take others, where
     these have no path to its target within the limits.  A motion that cannot be reached is passed over.
     """
@@ -81,14 +81,14 @@ def follow_axes(
     axes = axes[on_axes[rows]]
     placed = in_blocks(lambda part: np.isfinite(flange[part].position).all(axis=1), n)
     cartesian = np.concatenate([np.empty(0, bool), *placed]) & toolpath.known & ~toolpath.on_axes
-    status = _branches(robot, toolpath, axes, on_axes, cartesian, start)
+    branch = _branches(robot, toolpath, axes, on_axes, cartesian, start)
     if robot.external is not None:
-        status = np.where(np.isnan(external), -1, status)  # nothing states where it is
+        branch = np.where(np.isnan(external), -1, branch)  # nothing states where it is
 
     q = np.full((n, len(robot.joints)), np.nan)
     q[on_axes] = axes
-    solve = np.flatnonzero(cartesian & (status >= 0))
-    reachable = ~cartesian | (status < 0)
+    solve = np.flatnonzero(cartesian & (branch >= 0))
+    reachable = ~cartesian | (branch < 0)
     turn_holds, half_turns = np.ones(n, bool), HalfTurns()
     if isinstance(robot.nominal, SerialArm):
         _follow_on(robot, toolpath, flange, on_axes, solve, start, external, q)
@@ -100,24 +100,25 @@ def follow_axes(
             near = np.zeros((len(rows), q.shape[1]))
             if robot.external is not None:
                 near[:, robot.external] = external[rows]
-            solution = inverse(robot.nominal, flange[rows], status[rows], near)
+            solution = inverse(robot.nominal, flange[rows], branch[rows], near)
             q[rows], reachable[rows] = solution.q, solution.reachable
 
         each_block(solve_block, len(solve))
-        half_turns = _settle(robot, q, status, toolpath, on_axes, start, base, tool)
+        half_turns = _settle(robot, q, branch, toolpath, on_axes, start, base, tool)
         stated = np.flatnonzero(toolpath.configuration.stated & cartesian)
-        turn_holds[stated] = turns_match(toolpath.configuration.of(stated), q[stated])
+        maker = maker_of(toolpath.configuration)
+        turn_holds[stated] = maker.turns_match(toolpath.configuration.of(stated), q[stated])
 
     low, high = robot.limits.T
     margin = 1e-9
     within = ~((q < low - margin) | (q > high + margin)).any(axis=1)
-    return AxisTrack(q, status, reachable, within, turn_holds, half_turns)
+    return AxisTrack(q, branch, reachable, within, turn_holds, half_turns)
 
 
-def status_matches(toolpath: Toolpath, track: AxisTrack) -> Bools:
-    """(N,) the stated S, if there is one, is that of the branch taken."""
-    stated = stated_branches(toolpath.configuration)
-    return np.asarray((stated < 0) | (track.status < 0) | (stated & 7 == track.status))
+def branch_matches(toolpath: Toolpath, track: AxisTrack) -> Bools:
+    """(N,) the stated branch, if there is one, is that taken."""
+    stated = maker_of(toolpath.configuration).branches(toolpath.configuration)
+    return np.asarray((stated < 0) | (track.branch < 0) | (stated == track.branch))
 
 
 def external_joint(robot: Robot, toolpath: Toolpath, rows: Ints, start: Floats | None) -> Floats:
@@ -189,7 +190,7 @@ def _branches(
 ) -> Ints:
     """(N,) the branch in force at each motion; ``axes`` (R, n): of the motions ``on_axes``."""
     jump = np.isin(toolpath.kind, (Kind.PTP, Kind.AXIS))
-    branch = stated_branches(toolpath.configuration)
+    branch = maker_of(toolpath.configuration).branches(toolpath.configuration)
     stated = jump & cartesian & (branch >= 0)
     if isinstance(robot.nominal, SerialArm):
         stated = np.zeros_like(stated)
@@ -202,9 +203,9 @@ def _branches(
     )
     home = home_rows(toolpath)
     value = np.full(len(toolpath) + 1, -1, np.int8)
-    value[0] = -1 if start is None else status_of(robot.nominal, start[None])[0]
-    value[1:][on_axes] = status_of(robot.nominal, axes)
-    value[1:][stated] = branch[stated] & 7
+    value[0] = -1 if start is None else branch_of(robot.nominal, start[None])[0]
+    value[1:][on_axes] = branch_of(robot.nominal, axes)
+    value[1:][stated] = branch[stated]
     value[1:][home] = value[0]
     sets = np.concatenate([[True], on_axes | stated | lost])
     meets = np.flatnonzero(toolpath.paths_meet & ~sets[1:])
@@ -241,7 +242,7 @@ def _join_branches(
 def _settle(
     robot: Robot,
     q: Floats,
-    status: Ints,
+    branch: Ints,
     toolpath: Toolpath,
     on_axes: Bools,
     start: Floats | None,
@@ -270,13 +271,15 @@ def _settle(
         angles[:, 5] = np.where(straight, wrapped(total - angles[:, 3]), angles[:, 5])
         values[straight] = controller_values(arm, angles, values)[straight]
 
-    turn = np.where(rows >= 0, toolpath.configuration["turn"][rows], -1)
+    turn = np.where(
+        rows >= 0, maker_of(toolpath.configuration).negative_axes(toolpath.configuration)[rows], -1
+    )
     stated = (turn >= 0) & (np.where(rows >= 0, toolpath.kind[rows], -1) == Kind.PTP)
     reset = given | stated
     reset |= toolpath.paths_meet[np.maximum(rows, 0)]  # several motions may precede it
     reset[0] = True
     last = np.maximum.accumulate(np.where(reset, order, 0))
-    large = _large(robot, values, rows, reset, status, toolpath, base, tool)
+    large = _large(robot, values, rows, reset, branch, toolpath, base, tool)
 
     def turned(axis: int, step: Floats) -> tuple[Floats, Floats]:
         """(R,) the values of an axis that goes on from the first, and by how much they are beside those stated."""
@@ -326,7 +329,7 @@ def _large(
     values: Floats,
     rows: Ints,
     reset: Bools,
-    status: Ints,
+    branch: Ints,
     toolpath: Toolpath,
     base: Poses | None,
     tool: Poses | None,
@@ -364,7 +367,7 @@ def _large(
 
         def solve(owner: Ints, flange: Poses) -> Floats:
             near = values[at[owner] - 1]
-            return inverse(robot.nominal, flange, status[rows[at[owner]]], near).q[:, -6:]
+            return inverse(robot.nominal, flange, branch[rows[at[owner]]], near).q[:, -6:]
 
         step[on_path], more[on_path], vector[on_path], either[on_path] = turn_senses(
             motions, arm[at - 1], arm[at], solve
@@ -409,7 +412,7 @@ def nominal_flange(robot: Robot, q: Floats) -> Poses:
 def is_near_singular(robot: Robot, q: Floats) -> Bools:
     """(N,) ``q`` (N, n) [rad, m] is close to a place where axes turn far for a small step.
 
-    KUKA-type arms: A5 near 0, wrist over axis 1, arm stretched, that is within about 1.1 deg of A5 = 0 or of the
+    Arms of closed form: A5 near 0, wrist over axis 1, arm stretched, that is within about 1.1 deg of A5 = 0 or of the
     stretched arm (sine 0.02), or the wrist centre within 30 mm of axis 1.  Others: the smallest singular value of the
     Jacobian is below ``WEAK``.
     """

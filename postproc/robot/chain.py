@@ -193,11 +193,6 @@ class Chain:
         model.addFrame(pin.Frame("flange", parent, 0, tip, pin.FrameType.OP_FRAME))
         return model
 
-    @property
-    def flange_id(self) -> int:
-        """Of the frame ``flange`` in ``model``."""
-        return int(self.model.getFrameId("flange"))
-
     def evaluate(self, coordinates: Floats, tool: Poses, spindle: Floats | None = None) -> ChainKinematics:
         """Evaluate at ``coordinates`` (m, N) [rad, m].
 

@@ -1,8 +1,7 @@
 """Inverse kinematics as the controller does it: closed form for a spherical wrist, Newton's for any other arm.
 
-For a KUKA-type arm a configuration (branch) is written as KUKA's status S: bit 0 wrist root in the overhead area,
-bit 1 elbow (A3 beyond the stretched arm), bit 2 A5 < 0.  The turn T has bit i set where axis i + 1 is negative.
-Other arms have neither: their branch is the one that leads on from the angles before.
+An arm with a spherical wrist has eight branches (see ``BranchBit``); that of another arm is the one that leads on from
+the angles before.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.geometry import Poses, wrapped
+from postproc.robot.branches import BranchBit
 from postproc.robot.chain import sine_and_cosine
 from postproc.robot.geometries import Geometry, KukaLengths, KukaVariant, SerialArm
 from postproc.robot.newton import solve_near
@@ -28,21 +28,21 @@ class Inverse:
     reachable: Bools
 
 
-def inverse(arm: Geometry, flange: Poses, status: Ints, near: Floats) -> Inverse:
+def inverse(arm: Geometry, flange: Poses, branch: Ints, near: Floats) -> Inverse:
     """Joint values that bring the flange to poses in the robot base; FK(inverse(x)) = x to rounding.
 
     ``near`` (N, n) [rad, m]: each axis is given the multiple of a turn nearest to it, and its value where an axis is
-    not defined or is the external one.  KUKA-type arms take the branch ``status`` (N,), others that of ``near`` (see
+    not defined or is the external one.  Arms of closed form take ``branch`` (N,), others that of ``near`` (see
     ``newton.solve_near``).
     """
     if isinstance(arm, SerialArm):
         return Inverse(*solve_near(arm, flange, near))
     if isinstance(arm, KukaLengths):
-        return _closed_form(arm, flange, status, near)
+        return _closed_form(arm, flange, branch, near)
     if arm.rail is not None:
         travel = arm.signs[0] * near[:, 0] + arm.offsets[0]
         flange = Poses(flange.rotation, flange.position - travel[:, None] * arm.rail)
-    solution = _closed_form(arm.lengths, flange, status, kuka_angles(arm, near))
+    solution = _closed_form(arm.lengths, flange, branch, kuka_angles(arm, near))
     return Inverse(controller_values(arm, solution.q, near), solution.reachable)
 
 
@@ -66,7 +66,7 @@ def controller_values(arm: KukaLengths | KukaVariant, angles: Floats, like: Floa
     return values
 
 
-def _closed_form(arm: KukaLengths, flange: Poses, status: Ints, near: Floats) -> Inverse:
+def _closed_form(arm: KukaLengths, flange: Poses, branch: Ints, near: Floats) -> Inverse:
     """Angles (N, 6) of a KUKA-type arm.
 
     A1 is that of ``near`` with the wrist over axis 1, A4 with A5 = 0.
@@ -74,7 +74,7 @@ def _closed_form(arm: KukaLengths, flange: Poses, status: Ints, near: Floats) ->
     # columns (3, N) of the flange; its z points along the forearm where the wrist is straight
     fx, fy, fz = np.ascontiguousarray(np.moveaxis(flange.rotation, (-2, -1), (1, 0)))
     x, y, z = np.ascontiguousarray(flange.position.T) - arm.d6 * fz
-    overhead, elbow, flipped = ((status >> bit) & 1 == 1 for bit in range(3))
+    overhead, elbow, flipped = (branch & bit != 0 for bit in BranchBit)
     across = np.sqrt(x * x + y * y)
     a1 = -np.arctan2(y, x) + np.where(overhead, np.pi, 0.0)
     above = np.flatnonzero(across < _SINGULAR)
@@ -118,8 +118,8 @@ def forearm_tilt(arm: KukaLengths) -> float:
     return float(np.arctan2(-arm.a3, arm.d4))
 
 
-def status_of(arm: Geometry, q: Floats) -> Ints:
-    """S (N,) of joint values (N, n) [rad, m]; 0 for an arm that is not KUKA's."""
+def branch_of(arm: Geometry, q: Floats) -> Ints:
+    """(N,) the branch of joint values (N, n) [rad, m]; 0 for an arm without closed form."""
     if isinstance(arm, SerialArm):
         return np.zeros(len(q), np.int64)
     lengths = arm if isinstance(arm, KukaLengths) else arm.lengths
@@ -127,10 +127,9 @@ def status_of(arm: Geometry, q: Floats) -> Ints:
     tilt = forearm_tilt(lengths)
     wrist = lengths.a1 + lengths.a2 * np.cos(q[:, 1])
     wrist = wrist + np.hypot(lengths.d4, lengths.a3) * np.cos(q[:, 1] + q[:, 2] + tilt)
-    bits = [wrist < 0, wrapped(q[:, 2] + tilt) > 0, q[:, 4] < 0]
-    return sum((bit.astype(np.int64) << i for i, bit in enumerate(bits)), np.zeros(len(q), np.int64))
-
-
-def turn_of(q: Floats) -> Ints:
-    """T (N,) of axis angles (N, 6) [rad]: bit i is set where axis i + 1 is negative."""
-    return np.asarray(((q < 0).astype(np.int64) << np.arange(q.shape[1])).sum(axis=1))
+    behind, elbow, flipped = wrist < 0, wrapped(q[:, 2] + tilt) > 0, q[:, 4] < 0
+    return np.asarray(
+        BranchBit.WRIST_BEHIND * behind.astype(np.int64)
+        + BranchBit.ELBOW * elbow
+        + BranchBit.FLIPPED * flipped
+    )

@@ -58,7 +58,7 @@ def as_run(
         )
         refused.setdefault(row, Finding("KIN010", message, file, int(path.line[row])))
     control = replace(path.orientation_control, programmed=path.rotation)
-    run = replace(path, rotation=rotation, orientation_control=control).with_refused(
+    run = path.with_columns(rotation=rotation, orientation_control=control).with_refused(
         dict(sorted(refused.items()))
     )
     return run, _without_effect(path, rows, written, own, file)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -161,7 +161,7 @@ def fill_external_axes(
         for row in np.flatnonzero(needed & np.isinf(values)).tolist():
             refused.setdefault(row, place.not_known(values[row], path, row, file))
         columns[place.column] = np.where(np.isfinite(values), values, np.nan)
-    return replace(path, external=_with(path.external, columns)).with_refused(refused)
+    return path.with_columns(external=_with(path.external, columns)).with_refused(refused)
 
 
 def follow_external_axes(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from postproc.cell import AXES, KEYS, MODES
 from postproc.cell.stated_room import RANGES
 from postproc.cell.tool_errors import LARGEST, WALL_SIDES
+from postproc.languages import DIALECT_OPTIONS
 from postproc.robot.external_axes import FIXED, NAMES, POSITIONER, TRACK
 from postproc.robot.read_external_axes import DIRECTIONS
 from postproc.schemas.parts import Schema, flag, known, listed, mapping, number, numbers, text
@@ -187,8 +188,7 @@ CELL: dict[str, Schema] = {
     "dialect": mapping(
         {
             "name": text("the language of the programs [detected]"),
-            "integer_words": text("what X10 means [decided by the program]", ["mm", "um"]),
-            "config_dat": text("the controller's $config.dat, relative to this file"),
+            **{one.key: text(one.about, one.choices) for one in DIALECT_OPTIONS},
         },
         about="how programs are read",
     ),

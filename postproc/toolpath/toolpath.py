@@ -7,140 +7,148 @@ neither knows of the other.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from enum import IntEnum
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from postproc.base.arrays import Bools, FewRows, Floats, Ints, frozen, shared
+from postproc.base.arrays import Bools, FewRows, Floats, Ints
 from postproc.base.findings import Finding
 from postproc.base.geometry import Placed, Poses, abc_from_rotation, rotation_from_abc
 from postproc.base.units import DEG, MM
 from postproc.toolpath.arcs import ArcFrame, Arcs
-from postproc.toolpath.columns import MotionColumns, column, not_given
+from postproc.toolpath.columns import MotionColumns, column
 from postproc.toolpath.configuration import Configuration
 from postproc.toolpath.edit_constraints import EditConstraints
+from postproc.toolpath.motion_sequence import MotionSequence
+from postproc.toolpath.motion_speeds import MotionSpeeds
 from postproc.toolpath.orientation_control import OrientationControl, OrientationMode
 from postproc.toolpath.partial_targets import PartialTargets
+from postproc.toolpath.program_comments import Annotation, ProgramComments
+from postproc.toolpath.targets import LOST, FrameRef, Kind, Targets
 
-COMPUTED, LOST = np.inf, -np.inf
-"""An external axis whose value is an expression that is not constant; one that something else may have moved."""
-
-
-class Kind(IntEnum):
-    """What a motion statement does.  Point-to-point motions (PTP, AXIS) are air moves whatever the force."""
-
-    PTP = 0  # point to point, to a Cartesian target
-    AXIS = 1  # point to point, to axis angles
-    LIN = 2  # straight line
-    CIRC = 3  # circular arc, or a helix
-    OTHER = 4  # a motion that is none of these
-    SPL = 5  # a point of a spline: the path between is the controller's
-
-
-@dataclass(frozen=True)
-class FrameRef:
-    """A base or tool frame as the program names it.
-
-    ``pose`` is the frame where the program itself states it (in the world for a base, on the flange for
-    a tool); None where only the controller knows it, that is entry ``number`` of BASE_DATA / TOOL_DATA.
-    ``line`` is where it was set, for messages.  ``declared``: what the controller's own file states of a frame whose
-    ``pose`` the program does not state; the cell's base or tool of that number comes first.
-    """
-
-    number: int | None
-    pose: Poses | None
-    line: int = 0
-    declared: Poses | None = None
-
-
-@dataclass(frozen=True)
-class Annotation:
-    """A comment before the motion ``row``; one that speaks to this tool (FORCE, COMPENSATE) holds from there on."""
-
-    row: int
-    text: str
-    line: int
+STATED_BY_ALL = ("targets", "speeds", "sequence", "remarks")
+"""The parts of a toolpath whose fields can be asked for at the toolpath itself."""
 
 
 @dataclass(frozen=True)
 class Toolpath(MotionColumns):
     """N motions in the order of the text.
 
-    What every motion states:
-
-    ``kind`` (N,): Kind.
-    ``position`` (N, 3) [m], ``rotation`` (N, 3, 3): target of the TCP in the programmed base, NaN where it is not
-    known; the rotation is the one that the controller runs (see ``programmed_rotation``).
-    ``axes`` (N, 6) [rad]: target of AXIS motions, NaN for others.
-    ``external`` (N, 6) [mm or deg, as in the text]: external axes E1..E6 at the end of each motion; NaN where nothing
-    has stated them yet, ``COMPUTED`` or ``LOST`` where they are not known.
-    ``feed`` (N,) [m/s]: NaN where it is not known.
-    ``spindle`` (N,) [rad/s]: the speed of the spindle, as the program states it: below zero where it turns
-    counter-clockwise (-inf at a speed that is not known), 0 where it is stopped; NaN where nothing is stated, or it
-    varies.
-    ``inverse_time_feed`` (N,): the text gives the time that the motion takes, its feed follows from its length (G93).
-    ``base``, ``tool`` (N,): index into ``frames``, -1 where it is not known.
-    ``line`` (N,): from 1.
-    ``approximation`` (N,) [m]: the controller may depart from the path that far before the end point; 0 where it stops
-    or passes exactly, NaN where the distance is not known.
-    ``stops`` (N,): the controller comes to rest at the end point: it is not approximated (``approximation`` is 0), and
-    is no inner point of a spline block; without it wherever ``approximation`` is 0.
-    ``continues`` (N,): in every execution the motion starts where the row before it ends, and no other motion starts
-    there; the first one starts where the program does.  False where paths of the program meet or part, and for motions
-    that never run: where such a motion starts is not known.
-
-    ``drills`` (N,): the motion is a drill cycle, and its target the bottom of the hole: the tool comes down to it from
-    above and goes back up.  Neither it nor the motion behind it ``continues``, although no other motion is between.
-
-    What few motions state, and what holds of a dialect, is in types of its own.
-
-    ``predecessors``: row that does not continue the row before it -> the rows whose ends may be its start, -1 for the
-    start of the program, -2 for what the program does not contain.
-    ``annotations``: comments that speak to this tool; ``comments``: all others that are alone on their line.
+    ``line`` (N,): from 1.  All else is in parts; the columns that every motion states can be asked for here, too.
     """
 
-    kind: Ints = field(metadata=column(dtype=np.int8))
-    position: Floats = field(metadata=column(3))
-    rotation: Floats = field(metadata=column(3, 3))
-    axes: FewRows | Floats
-    feed: Floats = field(metadata=column())
-    base: Ints = field(metadata=column(dtype=np.int32))
-    tool: Ints = field(metadata=column(dtype=np.int32))
+    targets: Targets
     line: Ints = field(metadata=column(dtype=np.int32))
-    frames: tuple[FrameRef, ...]
+    speeds: MotionSpeeds
+    sequence: MotionSequence = field(default_factory=MotionSequence)
     arcs: Arcs = field(default_factory=Arcs)
     constraints: EditConstraints = field(default_factory=EditConstraints)
     partial_targets: PartialTargets = field(default_factory=PartialTargets)
     orientation_control: OrientationControl = field(default_factory=OrientationControl)
     configuration: Configuration = field(default_factory=Configuration)
-    external: Floats = field(default_factory=not_given, metadata=column(6, default=np.nan))
-    approximation: Floats = field(default_factory=not_given, metadata=column(default=0.0))
-    stops: Bools = field(default_factory=not_given)
-    continues: Bools = field(default_factory=not_given, metadata=column(dtype=np.bool_, default=True))
-    spindle: Floats = field(default_factory=not_given, metadata=column(default=np.nan))
-    drills: Bools = field(default_factory=not_given, metadata=column(dtype=np.bool_, default=False))
-    inverse_time_feed: Bools = field(
-        default_factory=not_given, metadata=column(dtype=np.bool_, default=False)
-    )
-    predecessors: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
-    annotations: tuple[Annotation, ...] = ()
-    comments: tuple[Annotation, ...] = ()
+    remarks: ProgramComments = field(default_factory=ProgramComments)
 
     def __post_init__(self) -> None:
-        n = len(self.kind)
+        n = len(self.targets.kind)
         self._fill(n)
-        stops = self.stops if len(self.stops) else self.approximation == 0.0
-        object.__setattr__(self, "stops", shared(frozen(stops, (n,), np.bool_)))
-        for part in ("arcs", "constraints", "partial_targets", "orientation_control", "configuration"):
-            object.__setattr__(self, part, getattr(self, part).for_motions(n))
-        object.__setattr__(self, "axes", FewRows.of(self.axes))
-        if self.axes.shape != (n, 6):
-            raise ValueError(f"axes have the shape {self.axes.shape} for {n} motions")
+        for name, part in list(vars(self).items()):
+            if isinstance(part, MotionColumns | Configuration):
+                object.__setattr__(self, name, part.for_motions(n))
 
     def __len__(self) -> int:
-        return len(self.kind)
+        return len(self.targets.kind)
+
+    @property
+    def kind(self) -> Ints:
+        """(N,) Kind: see ``Targets``."""
+        return self.targets.kind
+
+    @property
+    def position(self) -> Floats:
+        """(N, 3) [m] targets of the TCP: see ``Targets``."""
+        return self.targets.position
+
+    @property
+    def rotation(self) -> Floats:
+        """(N, 3, 3) orientations of the targets: see ``Targets``."""
+        return self.targets.rotation
+
+    @property
+    def axes(self) -> FewRows | Floats:
+        """(N, 6) [rad] targets of AXIS motions: see ``Targets``."""
+        return self.targets.axes
+
+    @property
+    def base(self) -> Ints:
+        """(N,) base of each motion, index into ``frames``: see ``Targets``."""
+        return self.targets.base
+
+    @property
+    def tool(self) -> Ints:
+        """(N,) tool of each motion, index into ``frames``: see ``Targets``."""
+        return self.targets.tool
+
+    @property
+    def frames(self) -> tuple[FrameRef, ...]:
+        """Bases and tools: see ``Targets``."""
+        return self.targets.frames
+
+    @property
+    def external(self) -> Floats:
+        """(N, 6) [mm or deg] external axes E1..E6: see ``Targets``."""
+        return self.targets.external
+
+    @property
+    def feed(self) -> Floats:
+        """(N,) [m/s]: see ``MotionSpeeds``."""
+        return self.speeds.feed
+
+    @property
+    def spindle(self) -> Floats:
+        """(N,) [rad/s] speed of the spindle: see ``MotionSpeeds``."""
+        return self.speeds.spindle
+
+    @property
+    def inverse_time_feed(self) -> Bools:
+        """(N,) the text gives the time of the motion: see ``MotionSpeeds``."""
+        return self.speeds.inverse_time_feed
+
+    @property
+    def approximation(self) -> Floats:
+        """(N,) [m] how far before its end point the path may be left: see ``MotionSequence``."""
+        return self.sequence.approximation
+
+    @property
+    def stops(self) -> Bools:
+        """(N,) the controller comes to rest at the end point: see ``MotionSequence``."""
+        return self.sequence.stops
+
+    @property
+    def continues(self) -> Bools:
+        """(N,) the motion starts where the row before it ends: see ``MotionSequence``."""
+        return self.sequence.continues
+
+    @property
+    def predecessors(self) -> Mapping[int, tuple[int, ...]]:
+        """Row -> rows whose ends may be its start: see ``MotionSequence``."""
+        return self.sequence.predecessors
+
+    @property
+    def drills(self) -> Bools:
+        """(N,) drill cycles: see ``MotionSequence``."""
+        return self.sequence.drills
+
+    @property
+    def annotations(self) -> tuple[Annotation, ...]:
+        """Comments that speak to this tool: see ``ProgramComments``."""
+        return self.remarks.annotations
+
+    @property
+    def comments(self) -> tuple[Annotation, ...]:
+        """All other comments that are alone on their line: see ``ProgramComments``."""
+        return self.remarks.comments
 
     @cached_property
     def known(self) -> Bools:
@@ -192,6 +200,19 @@ class Toolpath(MotionColumns):
             return np.asarray(_stated(self.external[:1]).any(axis=0))
         return np.asarray(_stated(self.external).any(axis=0))
 
+    def with_columns(self, **columns: Any) -> Toolpath:
+        """The toolpath with these columns (N, ...) instead: fields of ``Targets``, ``MotionSpeeds``,
+        ``MotionSequence`` or ``ProgramComments``, or its own.
+
+        Raises TypeError for a name that none of them has.
+        """
+        own: dict[str, Any] = {}
+        for name, part in vars(self).items():
+            if name in STATED_BY_ALL:
+                its = {one.name: columns.pop(one.name) for one in fields(part) if one.name in columns}
+                own |= {name: replace(part, **its)} if its else {}
+        return replace(self, **own, **columns)
+
     @property
     def target_in_base(self) -> Poses:
         return Poses(self.rotation, self.position)
@@ -213,7 +234,7 @@ class Toolpath(MotionColumns):
         )
         position, rotation = self.position.copy(), self.rotation.copy()
         position[rows], rotation[rows] = values[:, :3], rotation_from_abc(values[:, 3:])
-        return replace(self, position=position, rotation=rotation)
+        return self.with_columns(position=position, rotation=rotation)
 
     def dump(self) -> Iterator[str]:
         """The canonical list, one line a motion: line, kind, target (mm, deg), base, tool, feed, or the refusal."""

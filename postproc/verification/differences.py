@@ -277,7 +277,7 @@ def _same_frames(
 def _same_branch(
     original: CompensationProblem, run: CompensationProblem, rows: Ints, run_rows: Ints
 ) -> Bools:
-    return np.asarray(original.track.status[rows] == run.track.status[run_rows])
+    return np.asarray(original.track.branch[rows] == run.track.branch[run_rows])
 
 
 def _same_external(

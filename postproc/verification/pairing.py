@@ -53,7 +53,7 @@ class Stretches:
         moved = task.carries if task.process else task.carries | on_path
         # without any force all that moves along a path is looked at
         in_air = moved & ~task.carries & task.force.any
-        can = moved & path.known & (task.track.status >= 0) & ~np.isin(path.kind, _JUMPS)
+        can = moved & path.known & (task.track.branch >= 0) & ~np.isin(path.kind, _JUMPS)
         form = np.where(can, np.where(in_air, 3, 1 + (task.desired_path.traceable & on_path)), 0)
         change = np.ones(n, bool)
         change[1:] = (form[1:] != form[:-1]) | ~path.continues[1:]

@@ -139,7 +139,7 @@ class RunPath:
         stations = Stations(lost.row, lost.share, lost.row, lost.share, lost.axes, lost.restart)
         near = stations.crossing(lost)
         near = near[(near >= 0) & (near < len(self.reach))]
-        near = near[path.traceable[near] & (path.length[near] > 0) & (self.task.track.status[near] >= 0)]
+        near = near[path.traceable[near] & (path.length[near] > 0) & (self.task.track.branch[near] >= 0)]
         length = np.where(path.length > 0, path.length, 1.0)
         before = self.reach[near, None] / length[near, None]
         after = np.append(self.reach, 0.0)[near + 1, None] / length[near, None]

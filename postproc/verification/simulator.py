@@ -196,7 +196,7 @@ class Simulator:
             there = np.concatenate([self.pairing.run_air, *(part[1] for part in self._air(first, last))])
             # a motion that leads to a cut ends where that starts, which is looked at there
             leads = np.isin(in_air + 1, cuts.start[cuts.length]) & (path.kind[in_air] == Kind.LIN)
-            some = path.known & ~path.on_axes & (original.track.status >= 0)
+            some = path.known & ~path.on_axes & (original.track.branch >= 0)
             some = some[in_air] & ~leads
             wanted.append(in_air[some])
             rows.append((in_air if run is original else there)[some])

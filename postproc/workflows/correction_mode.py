@@ -84,7 +84,7 @@ def touch_off(task: CompensationProblem, cell: Cell) -> tuple[TouchedOff, list[F
             "external axes move in this program: it is not clear where they stood when its bases were touched off",
             "cut with external axes that do not move, or use correct: process",
         )
-    usable = path.known & ~path.on_axes & (track.status >= 0) & track.reachable
+    usable = path.known & ~path.on_axes & (track.branch >= 0) & track.reachable
     motions = usable & np.isin(path.kind, (Kind.LIN, Kind.CIRC, Kind.SPL))
     points = _points_by_frame(task, cell, np.unique(path.base[motions]).tolist())
     of_frame = []

@@ -37,6 +37,7 @@ from postproc.report.residuals import Sizes, lengths_of
 from postproc.robot.description import Robot
 from postproc.workflows.identify import Measured, measured_of
 from postproc.workflows.preparation import Stage, silent
+from postproc.workflows.readings_request import ReadingsRequest, spare_inputs
 from postproc.workflows.robot_files import new_robot_file
 
 FOLDS = 5
@@ -71,29 +72,24 @@ pose repeats its errors too.  Of two random poses it is a third."""
 
 
 @dataclass(frozen=True)
-class DiagnoseRequest:
-    """What the user asked for.  ``robot``: None takes the one that the data name; ``next_poses``: where a plan goes
-    that distinguishes explanations, beside ``output`` without it; ``payload_kg``: the heaviest weight to be hung, None
-    that of the robot file; ``pulls``: forces can be pulled with, in any direction and as large as those measured."""
+class DiagnoseRequest(ReadingsRequest):
+    """What the user asked for.  ``next_poses``: where a plan goes that distinguishes explanations, beside ``output``
+    without it; ``payload_kg``: the heaviest weight to be hung, None that of the robot file; ``pulls``: forces can be
+    pulled with, in any direction and as large as those measured."""
 
-    data: tuple[Path, ...]
-    robot: str | None = None
-    output: Path | None = None
     next_poses: Path | None = None
-    validate: tuple[Path, ...] = ()
-    tool_mm_deg: tuple[float, ...] | None = None
     payload_kg: float | None = None
     pulls: bool = False
-    picture: Path | None = None
-    page: Path | None = None
-    csv: Path | None = None
-    json: Path | None = None
-    strict: bool = False
+
+    @property
+    def written(self) -> list[Path]:
+        """The files that are to be written."""
+        return [*super().written, *([] if self.next_poses is None else [self.next_poses])]
 
 
 def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed:
     """What is missing in the robot file, by its name.  Raises Refusal, and has then written nothing."""
-    _spare_inputs(request)
+    spare_inputs(request)
     stage("reading")
     measured = measured_of(request.data, request.robot, request.tool_mm_deg)
     campaign, model = measured.campaign, measured.model
@@ -207,26 +203,6 @@ def gross_errors(final: Fit) -> tuple[Outlier, ...]:
     # an accident strikes one reading, or one pose: where several poses are off as a whole, the arm was there
     by_accident = len(wild) <= FEW * len(length) and (at_pose > 1).sum() <= 1
     return wild if by_accident else ()
-
-
-def _spare_inputs(request: DiagnoseRequest) -> None:
-    inputs = {place(path) for path in (*request.data, *request.validate)}
-    if request.robot and request.robot.endswith((".yaml", ".yml")):
-        inputs.add(place(Path(request.robot)))
-    outputs = (
-        request.output,
-        request.next_poses,
-        request.json,
-        request.csv,
-        request.picture,
-        request.page,
-    )
-    written = [path for path in outputs if path is not None]
-    for path in written:
-        if place(path) in inputs:
-            raise Refusal(Finding("FIL007", "the output would replace an input", str(path)))
-    if len({place(path) for path in written}) < len(written):
-        raise Refusal(Finding("FIL007", "two results have the same name", str(written[0])))
 
 
 def _next_poses(request: DiagnoseRequest, measured: Measured, diagnosis: Diagnosis) -> NextPoses | None:

@@ -30,6 +30,7 @@ from postproc.report.report import json_bytes
 from postproc.robot.description import Robot, find_robot, load_robot, robot_files
 from postproc.workflows.kinds import check_kind
 from postproc.workflows.preparation import Stage, silent
+from postproc.workflows.readings_request import ReadingsRequest, spare_inputs
 from postproc.workflows.robot_files import new_robot_file
 
 Progress = Callable[[str, int, int], None]
@@ -54,26 +55,16 @@ def no_progress(_stage: str, _done: int, _all: int) -> None:
 
 
 @dataclass(frozen=True)
-class IdentifyRequest:
-    """What the user asked for.  ``robot``: None takes the one that the data name; ``bootstrap``: number of draws, None
+class IdentifyRequest(ReadingsRequest):
+    """What the user asked for.  ``effects``: names of effects or EFFECT.PARAMETER; ``bootstrap``: number of draws, None
     where few poses ask for it."""
 
-    data: tuple[Path, ...]
-    robot: str | None
-    effects: tuple[str, ...]
-    output: Path | None = None
+    effects: tuple[str, ...] = ()
     priors: bool = False
     robust: bool = False
     drop_outliers: bool = False
-    validate: tuple[Path, ...] = ()
     folds: int = 5
     bootstrap: int | None = None
-    tool_mm_deg: tuple[float, ...] | None = None
-    picture: Path | None = None
-    page: Path | None = None
-    csv: Path | None = None
-    json: Path | None = None
-    strict: bool = False
 
 
 @dataclass(frozen=True)
@@ -89,7 +80,7 @@ class Measured:
 
 def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress = no_progress) -> Identified:
     """Parameters of effects from readings.  Raises Refusal, and has then written nothing."""
-    _spare_inputs(request)
+    spare_inputs(request)
     stage("reading")
     measured = measured_of(request.data, request.robot, request.tool_mm_deg)
     _spare(request.output, measured.robot.path)
@@ -209,20 +200,6 @@ def _known(named: str, path: Path) -> str:
             Finding("CEL003", "the readings name no robot", str(path), help="use --robot NAME or FILE")
         )
     return named
-
-
-def _spare_inputs(request: IdentifyRequest) -> None:
-    inputs = {place(path) for path in (*request.data, *request.validate)}
-    if request.robot and request.robot.endswith((".yaml", ".yml")):
-        inputs.add(place(Path(request.robot)))
-    written = [
-        p for p in (request.output, request.json, request.csv, request.picture, request.page) if p is not None
-    ]
-    for path in written:
-        if place(path) in inputs:
-            raise Refusal(Finding("FIL007", "the output would replace an input", str(path)))
-    if len({place(path) for path in written}) < len(written):
-        raise Refusal(Finding("FIL007", "two results have the same name", str(written[0])))
 
 
 def _spare(output: Path | None, robot: Path) -> None:

@@ -111,7 +111,7 @@ def read_job(request: Request) -> CutProgram:
     known = {cutter.number: index for index, cutter in enumerate(cutters)}
     desired = task.desired_path
     rows = np.flatnonzero(
-        task.carries & desired.traceable & (task.track.status >= 0) & task.track.reachable
+        task.carries & desired.traceable & (task.track.branch >= 0) & task.track.reachable
         & np.isin(numbers, list(known)) & np.isfinite(frames.spindle_in_tool[:, 0])
     )  # fmt: skip
     if not len(rows):

@@ -22,6 +22,7 @@ from postproc.placement.workspace_map import (
 )
 from postproc.report.mapped import Mapped, map_csv, slices_shown
 from postproc.report.report import exit_code, json_bytes
+from postproc.robot.branches import BranchBit
 from postproc.robot.description import check_programmable, find_robot, load_robot
 from postproc.robot.geometries import SerialArm
 from postproc.workflows.preparation import Stage, silent
@@ -89,7 +90,7 @@ def map_workspace(request: MapRequest, stage: Stage = silent) -> Mapped:
         stated=request.wrench,
         frame=request.frame,
         sign=", ".join(sorted(signs)) or None,
-        status=None if free else load.status,
+        status=None if free else int(load.branch),
     )
     findings = [
         *_lengths_in_metres(request),
@@ -144,7 +145,7 @@ def _load(request: MapRequest) -> MapLoad:
         tool=Poses.from_abc(place, turn),
         orientation=orientation,
         wrench=wrench.ravel(),
-        status=2 if request.status is None else request.status,
+        branch=BranchBit.ELBOW if request.status is None else request.status,
         linear=request.linear,
         ignore_limits=request.ignore_limits,
     )

@@ -14,6 +14,7 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import abc_from_rotation, rotation_from_vector
 from postproc.base.units import DEG, MM
 from postproc.cell import Cell
+from postproc.languages import DIALECT_OPTIONS
 from postproc.placement.room import TOOL_TURN, TRACK, TURN
 from postproc.robot.yaml_round_trip import Number, Quoted, edited
 
@@ -94,7 +95,9 @@ def _key(section: CommentedMap, name: object) -> object:
 def _rename(top: CommentedMap, old: Path, new: Path) -> None:
     """Names files beside the old cell from the folder of the new one."""
     dialect = top.get("dialect")
-    places = [(top, key) for key in FILES] + ([(dialect, "config_dat")] if dialect else [])
+    places = [(top, key) for key in FILES] + (
+        [(dialect, one.key) for one in DIALECT_OPTIONS if one.is_file and dialect]
+    )
     for section, key in places:
         value = section.get(key)
         if isinstance(value, str) and not os.path.isabs(value) and os.path.isfile(old / value):

@@ -80,7 +80,7 @@ def _check(ready: Prepared, request: PlaceRequest) -> None:
         row, words = found
         raise Refusal(Finding("PLC002", words, task.file, int(task.toolpath.line[row])))
     if len(margins.wrong):
-        message = "the stated configuration (S, T) of this motion is not one that reaches it"
+        message = "the stated configuration of this motion is not one that reaches it"
         raise Refusal(Finding("PLC002", message, task.file, int(task.toolpath.line[margins.wrong[0]])))
 
 

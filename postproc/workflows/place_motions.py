@@ -16,11 +16,12 @@ from postproc.compensation.problem import CompensationProblem
 from postproc.placement.margin_words import margin_words, reach_shortfall, reach_words
 from postproc.placement.part_motions import PartMotions
 from postproc.placement.singularity import singularity_angle
-from postproc.robot.axis_track import status_matches
+from postproc.robot.axis_track import branch_matches
 from postproc.robot.description import Robot
 from postproc.robot.external_axes import TRACK, own_column
 from postproc.robot.geometries import SerialArm
 from postproc.robot.inverse import inverse
+from postproc.robot.makers import maker_of
 from postproc.toolpath import Kind
 from postproc.workflows.preparation import Prepared
 
@@ -61,7 +62,7 @@ class MotionMargins:
 def placed_rows(task: CompensationProblem) -> Bools:
     """(N,) motions to a Cartesian target of which the configuration is known."""
     path = task.toolpath
-    return np.asarray(path.known & ~path.on_axes & (task.track.status >= 0))
+    return np.asarray(path.known & ~path.on_axes & (task.track.branch >= 0))
 
 
 def motion_margins(task: CompensationProblem) -> MotionMargins:
@@ -71,7 +72,7 @@ def motion_margins(task: CompensationProblem) -> MotionMargins:
     inner, share = inner_points(task.desired_path, rows)
     ends = np.where(track.reachable[rows, None], track.q[rows], np.nan)
     flange = _flanges(task, inner, share)
-    between = inverse(robot.nominal, flange, track.status[inner], task.q_reference(inner, share)).q
+    between = inverse(robot.nominal, flange, track.branch[inner], task.q_reference(inner, share)).q
     q, every = np.concatenate([ends, between]), np.concatenate([rows, inner])
     reached = np.isfinite(q).all(axis=1)
     q = np.where(reached[:, None], q, 0.0)
@@ -83,7 +84,7 @@ def motion_margins(task: CompensationProblem) -> MotionMargins:
     room = np.minimum(q - low, high - q)
     turns = np.array([joint.kind == "revolute" for joint in robot.joints])
     room[:, ~turns] = np.where(room[:, ~turns] >= -1e-9, np.inf, room[:, ~turns])
-    wrong = ~status_matches(path, track) & placed_rows(task) & (path.kind == Kind.PTP)
+    wrong = ~branch_matches(path, track) & placed_rows(task) & (path.kind == Kind.PTP)
     return MotionMargins(
         np.where(reached, room.min(axis=1), -np.inf),
         np.where(reached, singularity_angle(robot, q), -np.inf),
@@ -161,7 +162,7 @@ def build_motions(ready: Prepared, base: int, turned_tools: bool, track: str | N
 
     q = np.array(task.q_reference(rows, shares))
     flange = in_robot @ task.tool[rows].inverse()
-    q_inner = inverse(robot.nominal, flange, task.track.status[rows], np.nan_to_num(q))
+    q_inner = inverse(robot.nominal, flange, task.track.branch[rows], np.nan_to_num(q))
     q = np.where(np.isfinite(q), q, np.where(q_inner.reachable[:, None], q_inner.q, 0.0))
     q[~at_end] = np.where(q_inner.reachable[:, None], q_inner.q, q)[~at_end]
     head, anchor, sign = _heads(ready, rows, at_end)
@@ -189,7 +190,7 @@ def build_motions(ready: Prepared, base: int, turned_tools: bool, track: str | N
         tool=task.tool[rows],
         axis=axis,
         before=Poses(np.ascontiguousarray(before.rotation), np.ascontiguousarray(before.position)),
-        status=task.track.status[rows],
+        branch=task.track.branch[rows],
         q=q,
         head=head,
         anchor=anchor,
@@ -248,7 +249,8 @@ def _heads(ready: Prepared, rows: Ints, at_end: Bools) -> tuple[Ints, Floats, In
     start = ready.cell.start
     if isinstance(robot.nominal, SerialArm):
         return np.arange(len(rows)), task.track.q[rows], sign
-    stated = (path.configuration["turn"] >= 0) & (path.kind == Kind.PTP)
+    signs = maker_of(path.configuration).negative_axes(path.configuration)
+    stated = (signs >= 0) & (path.kind == Kind.PTP)
     resets = stated | path.on_axes | path.paths_meet
     resets[0] = True
     group = np.cumsum(resets)
@@ -260,7 +262,7 @@ def _heads(ready: Prepared, rows: Ints, at_end: Bools) -> tuple[Ints, Floats, In
     head = heads[np.cumsum(first) - 1]
     row = rows[heads]
     by_turn = np.flatnonzero(stated[row])
-    bits = (path.configuration["turn"][row[by_turn], None] >> np.arange(6)) & 1
+    bits = (signs[row[by_turn], None] >> np.arange(6)) & 1
     sign[heads[by_turn], -6:] = np.where(bits == 1, -1, 1)
     on_axes = np.flatnonzero(path.on_axes)
     last = np.searchsorted(on_axes, row) - 1

@@ -137,12 +137,11 @@ def read_program(
         help = f"name {name}: its data are read with it"
         raise Refusal(Finding("FIL009", f"{message}; the program is {name}", str(path), help=help))
     documents = (main, *(read_document(companion) for companion in companions))
-    if config_dat is None and cell is not None and cell.config_dat is not None:
-        config_dat = cell.path.parent / cell.config_dat
-    references = () if config_dat is None else (read_controller_data(config_dat),)
+    stated_files = [] if cell is None else cell.dialect_files
+    references = tuple(map(read_controller_data, stated_files if config_dat is None else [config_dat]))
     settings = ReadingSettings(references=references)
     if cell is not None:
-        stated = cell.orientation, cell.integer_words, references, (), cell.symbols, cell.program_start
+        stated = cell.orientation, cell.dialect_options, references, (), cell.symbols, cell.program_start
         settings = ReadingSettings(*stated)
     program, settings = read_with_siblings(dialect, documents, settings, beside)
     if not len(program.toolpath) and cell is not None and cell.dialect is not None:

@@ -12,8 +12,9 @@ from postproc.base.findings import Finding, Topic
 from postproc.base.units import DEG, MM
 from postproc.cell import Cell
 from postproc.languages.dialect import Program
-from postproc.robot.axis_track import AxisTrack, status_matches
+from postproc.robot.axis_track import AxisTrack, branch_matches
 from postproc.robot.description import Robot
+from postproc.robot.makers import maker_of
 from postproc.toolpath import Kind, Toolpath
 
 
@@ -46,21 +47,18 @@ def start_findings(cell: Cell, robot: Robot, start: Floats | None) -> list[Findi
 def configuration_findings(program: Path, path: Toolpath, track: AxisTrack) -> list[Finding]:
     """Where the stated configuration of a motion and the axes that bring the robot there disagree (KIN007, KIN013)."""
     # A path motion keeps the branch that the robot is in, whatever its target states.
-    elsewhere = ~status_matches(path, track) & path.known & np.isin(path.kind, (Kind.LIN, Kind.CIRC))
+    elsewhere = ~branch_matches(path, track) & path.known & np.isin(path.kind, (Kind.LIN, Kind.CIRC))
     turned = ~track.turn_matches
-    has_quadrants = "quadrants" in path.configuration.numbers
+    maker = maker_of(path.configuration)
+    has_quadrants = bool(maker.quadrant_message)
     findings = []
     for code, mask, message in (
-        ("KIN007", turned & (not has_quadrants), "the stated T (Turn) is not that of this pose"),
-        (
-            "KIN013",
-            turned & has_quadrants & ~elsewhere,
-            "the stated quadrants (cf1, cf4, cf6) are not those of this pose",
-        ),
+        ("KIN007", turned & (not has_quadrants), maker.turn_message),
+        ("KIN013", turned & has_quadrants & ~elsewhere, maker.turn_message),
         (
             "KIN007",
             elsewhere,
-            "the stated configuration (S, cfx) is not the one in which the robot reaches this pose",
+            f"the stated configuration ({maker.branch_word}) is not the one in which the robot reaches this pose",
         ),
     ):
         rows = np.flatnonzero(mask)

@@ -15,9 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from postproc.base.geometry import Poses, abc_from_rotation
+from postproc.robot.branches import negative_axes
 from postproc.robot.chain import Chain
 from postproc.robot.description import find_robot, load_robot
-from postproc.robot.inverse import inverse, status_of, turn_of
+from postproc.robot.inverse import branch_of, inverse
 
 ROBOT = load_robot(find_robot("kuka_kr270"))
 BASE = Poses.from_abc([1.4513, -0.1186, 0.7204], np.radians([12.3, 0.05, -0.08]))  # a fixture, touched off
@@ -162,7 +163,7 @@ def data_list() -> Iterator[str]:
     points, q = taught()
     external = ",".join(f"E{i} 0.0" for i in range(1, 7))
     for index, (step, point, s, t) in enumerate(
-        zip(STEPS, points, status_of(ROBOT.nominal, q), turn_of(q), strict=True), 1
+        zip(STEPS, points, branch_of(ROBOT.nominal, q), negative_axes(q), strict=True), 1
     ):
         pose = ",".join(f"{key} {number(value)}" for key, value in zip("XYZABC", point, strict=True))
         yield f"DECL E6POS XP{index}={{{pose},S {s},T {t},{external}}}"

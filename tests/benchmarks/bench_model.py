@@ -12,7 +12,7 @@ from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import mirror
 from postproc.effects import EFFECTS
 from postproc.model import NOTHING, StiffnessModel
-from postproc.robot.inverse import inverse, status_of
+from postproc.robot.inverse import branch_of, inverse
 
 COUNT = 2**15
 
@@ -48,7 +48,7 @@ def states(count):
 def test_inverse(measured):
     q, *_ = states(COUNT)
     arm = kr270().nominal
-    flange, status = heavy().chain.flange(q), status_of(arm, q)
+    flange, status = heavy().chain.flange(q), branch_of(arm, q)
     found = measured(lambda: inverse(arm, flange, status, q), COUNT)
     assert np.abs(found.q - q).max() < 1e-9
 
@@ -81,6 +81,6 @@ def test_linear_deflection(measured):
 def test_mirror(measured):
     q, wrench, *_ = states(COUNT)
     model = heavy()
-    wanted, status = model.chain.flange(q) @ TOOL, status_of(model.robot.nominal, q)
+    wanted, status = model.chain.flange(q) @ TOOL, branch_of(model.robot.nominal, q)
     done = measured(lambda: mirror(model, wanted, wanted, LoadCase(TOOL, wrench, NOTHING, status, q)), COUNT)
     assert done.converged.all()

@@ -29,7 +29,7 @@ def run(program: Path, output: Path) -> int:
     """How many motions were written."""
     robot = load_robot(find_robot("kuka_kr270"))
     chain = Chain(robot.joints, robot.flange)
-    model, flange, count = chain.model, chain.flange_id, 0
+    model, flange, count = chain.model, chain.model.getFrameId("flange"), 0
     data, axes = pin.Data(model), np.zeros(model.nq)
     frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     with open(program, newline="") as lines, open(output, "w", newline="") as out:

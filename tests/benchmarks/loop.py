@@ -41,7 +41,7 @@ class Loop:
         if set(terms) != {"joint_compliance", "gravity_compensator"}:
             raise ValueError(f"another model than this loop's: {sorted(terms)}")
         chain = Chain(robot.joints, robot.flange)
-        self.model, flange = chain.model, chain.model.frames[chain.flange_id]
+        self.model, flange = chain.model, chain.model.frames[chain.model.getFrameId("flange")]
         placed = flange.placement * pin.SE3(np.array(tool.rotation), np.array(tool.position))
         frame = pin.Frame("tcp", flange.parentJoint, 0, placed, pin.FrameType.OP_FRAME)
         self.tcp = self.model.addFrame(frame)

@@ -41,7 +41,7 @@ from postproc.compensation.mirror import ANGLE_TOLERANCE, POSITION_TOLERANCE, in
 from postproc.model import NOTHING, StiffnessModel
 from postproc.robot.chain import Chain
 from postproc.robot.description import find_robot, load_robot
-from postproc.robot.inverse import status_of
+from postproc.robot.inverse import branch_of
 from tests.benchmarks.loop import Loop
 from tests.benchmarks.machine import heading
 from tests.benchmarks.parts import made_apart
@@ -99,7 +99,7 @@ def timed(work: Callable[[], object], count: int) -> float:
 def mirror_loop(states: States) -> None:
     model, q, wrench = states.model, states.q, states.wrench
     wanted = model.chain.flange(q) @ TOOL
-    status = status_of(model.robot.nominal, q)
+    status = branch_of(model.robot.nominal, q)
     loop = Loop(model, TOOL)
     places = [pin.SE3(wanted.rotation[i], wanted.position[i]) for i in range(PLAIN)]
 
@@ -139,7 +139,9 @@ def linear_deflection(states: States, python: str, folder: Path) -> None:
     model = states.model.without_effects(["gravity_compensator"])
     chain = Chain(model.robot.joints, model.robot.flange)
     placed = [chain.model.jointPlacements[i + 1] for i in range(chain.model.nq)]
-    placed.append(chain.model.frames[chain.flange_id].placement * pin.SE3(TOOL.rotation, TOOL.position))
+    placed.append(
+        chain.model.frames[chain.model.getFrameId("flange")].placement * pin.SE3(TOOL.rotation, TOOL.position)
+    )
     compliance = list(model.terms[0].values.values())
     given, answer = folder / "states.npz", folder / "deflections.npy"
     np.savez(

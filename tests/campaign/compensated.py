@@ -18,7 +18,7 @@ from postproc.identification.unknowns import asked_for
 from postproc.measurements import measurements_csv
 from postproc.model import NOTHING, StiffnessModel
 from postproc.robot.description import load_robot
-from postproc.robot.inverse import status_of
+from postproc.robot.inverse import branch_of
 from postproc.workflows.identify import IdentifyRequest, identify
 
 from . import rig
@@ -63,7 +63,7 @@ def errors(plant: Plant, motors: np.ndarray, cuts: Cuts) -> np.ndarray:
 def share(plant: Plant, model: StiffnessModel, cuts: Cuts, before: np.ndarray) -> float:
     """Of the deflection ``before`` (N,) [m], the share that a compensation with ``model`` takes away: the median over
     the cuts."""
-    status = status_of(model.robot.nominal, cuts.q)
+    status = branch_of(model.robot.nominal, cuts.q)
     done = mirror(model, cuts.wanted, cuts.wanted, LoadCase(CUTTER, cuts.wrench, NOTHING, status, cuts.q))
     assert done.converged.all()
     return float(np.median(1 - errors(plant, done.q, cuts) / before))
@@ -93,5 +93,5 @@ def by_files(trial: Trial, seed: int, campaign: int, folder: Path) -> StiffnessM
     data, robot, new = (folder / name for name in ("readings.csv", "robot.yaml", "identified.yaml"))
     data.write_bytes(measurements_csv(readings))
     robot.write_bytes(raw)
-    identify(IdentifyRequest((data,), str(robot), trial.words, new, folds=0, bootstrap=0))
+    identify(IdentifyRequest((data,), str(robot), new, effects=trial.words, folds=0, bootstrap=0))
     return StiffnessModel.from_robot(load_robot(new))

@@ -7,26 +7,18 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
-from typing import NamedTuple
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.findings import Finding
-from postproc.toolpath import Annotation, Toolpath
+from postproc.toolpath import Toolpath
 
 OTHER_PATHS = "several paths of the program lead to it or from the motion before it"
 SHOWN = 20
 """Statements that are not understood are reported one by one up to this number."""
 SPEAKS = re.compile(r"(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
 """What a comment starts with that speaks to this tool."""
-
-
-class PlacedRemarks(NamedTuple):
-    """Comments at the rows before which they are: those that speak to this tool, and others."""
-
-    annotations: tuple[Annotation, ...]
-    comments: tuple[Annotation, ...]
 
 
 def follow_on(joined: Bools, rows: Sequence[int], before: Sequence[tuple[int, ...]]) -> Bools:
@@ -47,8 +39,8 @@ def only_used(path: Toolpath) -> Toolpath:
     used = used[used >= 0]
     new = np.full(len(path.frames) + 1, -1, np.int32)
     new[used] = np.arange(len(used))
-    return replace(
-        path, base=new[path.base], tool=new[path.tool], frames=tuple(path.frames[i] for i in used.tolist())
+    return path.with_columns(
+        base=new[path.base], tool=new[path.tool], frames=tuple(path.frames[i] for i in used.tolist())
     )
 
 

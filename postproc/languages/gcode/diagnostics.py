@@ -9,6 +9,7 @@ from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.languages.dialect import ReadingSettings
 from postproc.languages.gcode.blocks import AXES, BlockWords
+from postproc.languages.gcode.cell_options import INTEGER_WORDS
 from postproc.languages.gcode.control import Group, Once
 from postproc.languages.gcode.correctability import UNUSED, code_name
 from postproc.languages.gcode.execution_flow import CALLS, FlowReason
@@ -130,7 +131,7 @@ def diagnostics(
         values = np.stack([words.number(axis) for axis in AXES[:3]], axis=1)
         whole[rows] = (hows & (values != 0))[rows].any(axis=1)
         add(whole, "GCO027", words.integers.message)
-    if settings.integer_words == "um" and not words.control.increments:
+    if settings.options.get(INTEGER_WORDS) == "um" and not words.control.increments:
         whole = none.copy()
         hows = np.stack([words.how(axis) for axis in AXES[:3]], axis=1) == How.INTEGER
         whole[rows] = hows[rows].any(axis=1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -19,24 +18,20 @@ from postproc.languages.dialect import PLAIN, Program, ReadingSettings
 from postproc.languages.gcode import offsets
 from postproc.languages.gcode.block_arcs import arcs_of_blocks, given_by_point
 from postproc.languages.gcode.blocks import (
-    AXES,
-    SMALL_ANGLE,
     BlockWords,
     Reasons,
     blocks,
     frame_events,
     tilted,
 )
+from postproc.languages.gcode.cell_options import INTEGER_WORDS
 from postproc.languages.gcode.comments import remarks
 from postproc.languages.gcode.control import (
     Control,
-    Event,
     Feed,
     Group,
     Move,
     Once,
-    ProgrammedFrame,
-    either_frame,
 )
 from postproc.languages.gcode.correctability import (
     Built,
@@ -57,8 +52,8 @@ from postproc.languages.gcode.drill_cycles import (
 from postproc.languages.gcode.execution import FoldedWords, execute
 from postproc.languages.gcode.external_axes import external_axes, moves_external, others_move
 from postproc.languages.gcode.feeds import Feeds, blend_tolerances, blends, with_stops
+from postproc.languages.gcode.frame_changes import frame_blocks, frame_change
 from postproc.languages.gcode.integer_words import integer_words
-from postproc.languages.gcode.lexing import FARTHEST
 from postproc.languages.gcode.modal import modal
 from postproc.languages.gcode.modal_fill import FilledRows, everywhere
 from postproc.languages.gcode.motions import GcodeMotions
@@ -69,8 +64,18 @@ from postproc.languages.gcode.refusals import RefusalCollector
 from postproc.languages.gcode.source_map import STATE, FoldedNumbers, GcodeSourceMap
 from postproc.languages.gcode.subprogram_files import JoinedText, file_name, join
 from postproc.languages.gcode.tool_orientation import ToolOrientations
-from postproc.languages.gcode.words import How, Note, key
-from postproc.toolpath import Arcs, EditConstraints, Kind, OrientationControl, Toolpath
+from postproc.languages.gcode.words import key
+from postproc.toolpath import (
+    Arcs,
+    EditConstraints,
+    Kind,
+    MotionSequence,
+    MotionSpeeds,
+    OrientationControl,
+    ProgramComments,
+    Targets,
+    Toolpath,
+)
 
 PART = 1 << 14
 """Blocks whose motions are worked out at a time."""
@@ -81,7 +86,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     document = documents[0]
     joined = join(document.raw, settings.siblings, control)
     text = joined.source
-    integers = integer_words(text, control, settings.integer_words)
+    integers = integer_words(text, control, settings.options.get(INTEGER_WORDS, ""))
     execution = execute(text, control, settings.symbols, joined.blocks if joined.files else None)
     if joined.files and not execution.followed:
         return read(documents, control, replace(settings, siblings=()))
@@ -132,16 +137,27 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     timed = state["feed_mode"] == Feed.INVERSE_TIME
     drilled = found.take_column("drills")
     path = Toolpath(
-        kind=built.kind,
-        position=found.take_column("place"),
-        rotation=found.take_column("rotation"),
-        axes=everywhere(np.full(6, np.nan), len(rows)),
-        feed=found.take_column("feed"),
-        spindle=shared(found.take_column("spindle")),
-        base=frame_of_base,
-        tool=frame_of_tool,
+        targets=Targets(
+            kind=built.kind,
+            position=found.take_column("place"),
+            rotation=found.take_column("rotation"),
+            axes=everywhere(np.full(6, np.nan), len(rows)),
+            base=frame_of_base,
+            tool=frame_of_tool,
+            frames=cell_frames,
+            external=external,
+        ),
         line=line,
-        frames=cell_frames,
+        speeds=MotionSpeeds(
+            feed=found.take_column("feed"),
+            spindle=shared(found.take_column("spindle")),
+            inverse_time_feed=timed if timed.any() else everywhere(False, len(rows)),
+        ),
+        sequence=MotionSequence(
+            approximation=with_stops(found.take_column("blend"), given, rows),
+            continues=~(drilled | np.append(False, drilled[:-1])[: len(rows)]),
+            drills=drilled,
+        ),
         constraints=EditConstraints(
             refused=refused,
             locked=locked_rows(document, given, built, collector, execution, run.levels),
@@ -154,18 +170,12 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
             exact_stays=True,
             ptp_may_change_configuration=False,
         ),
-        annotations=said.annotations,
         arcs=Arcs(*(found.take_column(name) for name in ("centre", "normal", "sweep", "plane_free"))),
-        approximation=with_stops(found.take_column("blend"), given, rows),
-        comments=said.comments,
-        inverse_time_feed=timed if timed.any() else everywhere(False, len(rows)),
         orientation_control=OrientationControl(
             path=found.take_column("orientation_path"),
             **{name: found.take_column(name) for name in ("rotary_from", "rotary_to", "redundant_axis")},
         ),
-        external=external,
-        drills=drilled,
-        continues=~(drilled | np.append(False, drilled[:-1])[: len(rows)]),
+        remarks=ProgramComments(said.annotations, said.comments),
     )
     findings = [
         *_read_too(document, joined, execution.missing),
@@ -251,8 +261,8 @@ def _followed(
 ) -> FollowedMotions:
     """The motions in the blocks ``rows`` (N,), part by part; base (N,), tool (B,): numbers."""
     turned = None if settings.orientation is None else rotation_from_abc(settings.orientation)
-    events = _events(words)
-    trace = Trace(offsets.start(), events, _change(words, events), _start(settings))
+    events = frame_blocks(words)
+    trace = Trace(offsets.start(), events, frame_change(words, events), _start(settings))
     feeds, tool_orientations, away, reasons = (
         Feeds(words),
         ToolOrientations(words, turned),
@@ -346,59 +356,6 @@ def _columns(
         "turned_before": stand.before,
         "feed_mode": force[Group.FEED][rows],
     }
-
-
-def _events(words: BlockWords) -> Ints:
-    """Blocks that change the frame: G92 and G52 only with coordinates."""
-    mentioned = words.has(*(key(letter) for letter in "XYZABC"))
-    always = words.modal.has(Once.UNSHIFT, Once.SUSPEND, Once.RESTORE, Once.FRAME)
-    return np.flatnonzero(
-        (always | (words.modal.has(Once.SHIFT, Once.LOCAL) & mentioned)) & words.modal.flow.tape
-    )
-
-
-def _change(
-    block_words: BlockWords, events: Ints
-) -> Callable[[int, ProgrammedFrame, Floats], ProgrammedFrame]:
-    """The frame after a block that changes it; unknown where the block may not run."""
-    change = block_words.control.frame
-    notes: dict[int, list[Note]] = {block: [] for block in events.tolist()}
-    for note in block_words.source.notes if notes else ():
-        if note.block in notes:
-            notes[note.block].append(note)
-
-    keys = [one for one in block_words.columns if one in block_words.source.columns]
-
-    def changed(block: int, frame: ProgrammedFrame, position: Floats) -> ProgrammedFrame:
-        here = block_words.part(block, block + 1)
-        lengths = float(here.length_of_integer[0] / here.length[0])
-        angles = SMALL_ANGLE if block_words.integers.increments else 1.0
-        small = {one: angles if one in AXES[3:] else lengths for one in keys}
-        words = {
-            one: float(column.value[-1] * (small[one] if column.how[-1] == How.INTEGER else 1.0))
-            for one in keys
-            if len(column := here.words(one))
-        }
-        if here.ambiguous.any():
-            words = {one: math.nan if one in AXES[:3] else value for one, value in words.items()}
-        codes = tuple(here.words(key("G")).value.tolist())
-        event = Event(
-            words,
-            int(here.modal.once[0]),
-            tuple(notes[block]),
-            codes,
-            int(here.modal.force[Group.PLANE][0]),
-            float(here.length[0]),
-            frame,
-            position,
-        )
-        after = change(event)
-        after = replace(after, shift=np.where(np.abs(after.shift) > FARTHEST * MM, np.nan, after.shift))
-        if here.modal.flow.reason[0]:
-            return either_frame(frame, after)
-        return after
-
-    return changed
 
 
 def _motions(

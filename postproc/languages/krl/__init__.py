@@ -11,6 +11,7 @@ from postproc.base.read_files import list_folder
 from postproc.languages.dialect import (
     MARK,
     PLAIN,
+    DialectOption,
     EditedTargets,
     Plan,
     Program,
@@ -19,6 +20,9 @@ from postproc.languages.dialect import (
     put_mark,
 )
 from postproc.languages.krl import codes as codes
+
+OPTIONS = (DialectOption("config_dat", "the controller's $config.dat, relative to this file", is_file=True),)
+"""What a cell may state for this language."""
 
 _CLAIM = re.compile(
     rb"^(?:\xef\xbb\xbf)?[ \t]*(?:(?:GLOBAL[ \t]+)?DEF[ \t]+[A-Za-z_$][A-Za-z0-9_$]*[ \t]*(?:\(|;|\r?$)"

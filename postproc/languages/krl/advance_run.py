@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from postproc.base.arrays import Bools
 from postproc.languages.core.waits import Waits
-from postproc.languages.krl.lexing import Assignment, Call, Statement, cached, identifiers
+from postproc.languages.krl.lexing import Assignment, Call, Statement, StatementKind, cached, identifiers
 from postproc.languages.krl.modal_state import NAN, Source
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.predecessors import expanded
@@ -29,6 +29,15 @@ _WORDS = frozenset(
 )
 _SILENT_WORDS = frozenset(
     b"TRIGGER INTERRUPT GLOBAL CONTINUE EXT EXTFCT EXTP IMPORT SIGNAL ENUM STRUC INI BRAKE".split()
+)
+_SILENT_KINDS = (
+    StatementKind.COMMENT,
+    StatementKind.DEF,
+    StatementKind.END,
+    StatementKind.LABEL,
+    StatementKind.GOTO,
+    StatementKind.EXIT,
+    StatementKind.DECLARATION,
 )
 _DECIDING = frozenset(b"IF WHILE UNTIL FOR SWITCH CASE RETURN".split())
 _TALKING = frozenset(
@@ -50,9 +59,9 @@ def _stop(statement: Statement, type_of: Callable[[bytes], bytes]) -> Waits:
     kind, word, said = statement.kind, statement.word, statement.strings
     if word in (b"WAIT", b"HALT"):
         return Waits.YES
-    if word in _SILENT_WORDS or kind in ("comment", "def", "end", "label", "goto", "exit", "declaration"):
+    if word in _SILENT_WORDS or kind in _SILENT_KINDS:
         return Waits.NO
-    if word in (b"ANOUT", b"ANIN", b"DIGIN") or kind in ("strange", "foreign"):
+    if word in (b"ANOUT", b"ANIN", b"DIGIN") or kind in (StatementKind.UNREADABLE, StatementKind.UMLAUT_NAME):
         return Waits.MAYBE
     if isinstance(said, Call):
         if said.name == b"PULSE":

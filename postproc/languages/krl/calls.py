@@ -177,7 +177,7 @@ class Calls(BlockFlow):
         self.reachable = False
         return pc + 1
 
-    def _leave(self, pc: int, kind: str) -> int | None:
+    def _leave(self, pc: int, by_return: bool = False) -> int | None:
         """A RETURN, or the end of a routine."""
         run, active = self.run, self.activations[-1]
         if run.routine is None:
@@ -187,7 +187,7 @@ class Calls(BlockFlow):
             run.rows.stopped_at_end.append((len(run.rows), run.state.sources, run.state.stop))
         if run.walked and not active.blocks and self.reachable:
             run.rows.unfollowed_ends |= run.state.sources
-        if kind == "return" and not self._is_single(own):
+        if by_return and not self._is_single(own):
             loop = next((f for f in own if f.followed and f.block.word in LOOPS - {b"FOR"}), None)
             if loop is not None:
                 return self._abort(loop)

@@ -15,6 +15,7 @@ from postproc.languages.krl.lexing import (
     SCALARS,
     Assignment,
     Declared,
+    StatementKind,
     identifiers,
     lines,
     statement,
@@ -117,7 +118,9 @@ def read_data(result: Declarations, document: Document, file: int) -> None:
     everything = not foreign or "config" in document.path.stem.lower()
     for line, start, stop in lines(document):
         found = statement(document.raw, line, start, stop)
-        if found is None or (found.kind != "declaration" and found.kind != "assignment"):
+        if found is None or (
+            found.kind != StatementKind.DECLARATION and found.kind != StatementKind.ASSIGNMENT
+        ):
             continue
         span = Span(file, start, start + len(document.raw[start:stop].rstrip(b"\r\n")))
         said = found.strings

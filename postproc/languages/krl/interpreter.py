@@ -25,7 +25,7 @@ from postproc.languages.krl.data import (
 )
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.flow_frames import Restart, Unfollowed
-from postproc.languages.krl.lexing import FRAME_TABLES, Head, Statement, lines, module_name
+from postproc.languages.krl.lexing import FRAME_TABLES, Head, Statement, StatementKind, lines, module_name
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.open_blocks import BUDGET
 from postproc.languages.krl.other_modules import is_module, read_modules, visible
@@ -57,7 +57,7 @@ _OVERRIDE = re.compile(rb"\$OV_(?:PRO|ROB)", re.I)
 
 _MARK = f";{MARK}".encode()
 _MARKER = re.compile(rb"(?:\xef\xbb\xbf)?([ \t]*" + _MARK + rb"[^\r\n]*)")
-_MOTION = Statement("motion", b"", b"", 0, 0)
+_MOTION = Statement(StatementKind.MOTION, b"", b"", 0, 0)
 
 
 @without_garbage_collection()
@@ -259,7 +259,7 @@ def _marker(raw: bytes) -> Span | None:
 def _marker_at(document: Document, code: Sequence[Item]) -> Span:
     """After the first DEF line; without one after the header lines."""
     for item in code:
-        if isinstance(item, Statement) and item.kind == "def":
+        if isinstance(item, Statement) and item.kind == StatementKind.DEF:
             behind = document.raw.find(b"\n", item.at) + 1 or len(document.raw)
             return Span(0, behind, behind)
     at = len(BOM_UTF8) if document.raw.startswith(BOM_UTF8) else 0

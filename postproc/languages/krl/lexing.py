@@ -9,6 +9,7 @@ import math
 import re
 from codecs import BOM_UTF8
 from collections.abc import Callable, Iterator
+from enum import StrEnum, auto
 from functools import lru_cache, wraps
 from typing import NamedTuple, TypeGuard, TypeVar
 
@@ -42,7 +43,7 @@ FRAME_TABLES = (b"BASE_DATA", b"TOOL_DATA")
 RECORD_TYPES = frozenset([b"FDAT", b"LDAT", b"PDAT", b"ODAT"])
 SCALARS = frozenset([b"INT", b"REAL", b"BOOL", b"CHAR"])
 TYPES = POINT_TYPES | RECORD_TYPES | SCALARS
-KEPT = frozenset(
+SYSTEM_WORDS = frozenset(
     b"HALT WAIT CONTINUE INTERRUPT TRIGGER BRAKE RESUME EXT EXTFCT "
     b"IMPORT SIGNAL ENUM STRUC ANOUT ANIN DIGIN INI".split()
 )
@@ -81,6 +82,42 @@ _NUMBER = re.compile(rb"[-+]?[ \t]*+(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d{1,4
 _RADIX = re.compile(rb"'[ \t]*(?:[Bb][ \t]*([01]+)|[Hh][ \t]*([0-9A-Fa-f]+))[ \t]*'\Z")
 
 
+class StatementKind(StrEnum):
+    """What a line is."""
+
+    HEADER = auto()  # &ACCESS and the like, before the first DEF
+    COMMENT = auto()  # nothing else
+    DEF = auto()
+    END = auto()
+    DECLARATION = auto()
+    ASSIGNMENT = auto()
+    CALL = auto()
+    MOTION = auto()
+    OPEN = auto()  # a block: IF, SWITCH, loops, splines
+    BRANCH = auto()  # ELSE, CASE, DEFAULT
+    CLOSE = auto()  # a block
+    LABEL = auto()
+    GOTO = auto()
+    EXIT = auto()
+    RETURN = auto()
+    SYSTEM = auto()  # WAIT, INTERRUPT, TRIGGER, SIGNAL, ...: no value changes at it
+    UMLAUT_NAME = (
+        auto()
+    )  # an assignment, call or declaration of a name with umlauts, each byte of them ``_`` in it
+    UNREADABLE = auto()  # letters that KRL does not have hide what it does
+    OTHER = auto()
+
+
+BEFORE_CASES = (
+    StatementKind.COMMENT,
+    StatementKind.BRANCH,
+    StatementKind.CLOSE,
+    StatementKind.END,
+    StatementKind.DEF,
+)
+"""What may follow on SWITCH."""
+
+
 class Assignment(NamedTuple):
     name: bytes  # upper case
     element: bytes | None  # what is in the brackets of an array's element
@@ -116,13 +153,9 @@ Said = Assignment | Call | Declared | Head | bytes | None
 
 
 class Statement(NamedTuple):
-    """One line: its kind, its first word (upper case), its code without comment, and what it says.
+    """One line: its kind, its first word (upper case), its code without comment, and what it says."""
 
-    Kind "strange": letters that KRL does not have hide what it does; "foreign": an assignment, a call or a declaration
-    whose name has umlauts, each byte of them ``_`` in what it says.
-    """
-
-    kind: str
+    kind: StatementKind
     word: bytes
     code: bytes
     line: int
@@ -202,8 +235,7 @@ def lines(document: Document) -> Iterator[tuple[int, int, int]]:
 
 
 def statement(raw: bytes, line: int, start: int, stop: int) -> Statement | None:
-    """The statement of a line; None for an empty one.  A pure comment is of kind "comment", a line of the header, which
-    is before the first DEF, of kind "header"."""
+    """The statement of a line; None for an empty one."""
     found = _parts_of(raw[start:stop])
     if found is None:
         return None
@@ -214,20 +246,20 @@ def statement(raw: bytes, line: int, start: int, stop: int) -> Statement | None:
 
 
 @cached
-def _parts_of(line: bytes) -> tuple[str, bytes, bytes, int, Said, bytes] | None:
+def _parts_of(line: bytes) -> tuple[StatementKind, bytes, bytes, int, Said, bytes] | None:
     """Kind, first word, code, its offset, what it says and the comment of a line that starts at byte 0."""
     code, comment = split_comment(line.rstrip(b"\r\n"))
     stripped = code.lstrip(b" \t\x0c\x0b\x00\r")
     at = len(code) - len(stripped)
     code = stripped.rstrip(b" \t\x0c\x0b\x00\r")
     if not code:
-        return ("comment", b"", b"", at, None, comment) if comment else None
+        return (StatementKind.COMMENT, b"", b"", at, None, comment) if comment else None
     if code.startswith(b"&"):
-        return "header", b"&", code, at, None, comment
+        return StatementKind.HEADER, b"&", code, at, None, comment
     first = _FIRST.match(code)
     word = first[1].upper() if first else b""
     kind, said = _kind(word, code, at)
-    if not code.isascii() and kind in ("other", "goto") and has_foreign_letters(code):
+    if not code.isascii() and kind in (StatementKind.OTHER, StatementKind.GOTO) and has_foreign_letters(code):
         kind, said = _nonstandard(word, code, at)
     return kind, word, code, at, said, comment
 
@@ -246,14 +278,14 @@ def has_foreign_letters(code: bytes) -> bool:
     return not without_strings(code).isascii()
 
 
-def _nonstandard(word: bytes, code: bytes, at: int) -> tuple[str, Said]:
+def _nonstandard(word: bytes, code: bytes, at: int) -> tuple[StatementKind, Said]:
     plain = _GERMAN.sub(lambda found: b"_" * len(found[0]), code)
     if word != b"GOTO" and len(code) <= LONGEST and not has_foreign_letters(plain):
         first = _FIRST.match(plain)
         kind, said = _kind(first[1].upper() if first else b"", plain, at)
-        if kind in ("assignment", "call", "declaration"):
-            return "foreign", said
-    return "strange", None
+        if kind in (StatementKind.ASSIGNMENT, StatementKind.CALL, StatementKind.DECLARATION):
+            return StatementKind.UMLAUT_NAME, said
+    return StatementKind.UNREADABLE, None
 
 
 def _parameters(text: bytes) -> tuple[tuple[bytes, bool], ...]:
@@ -265,40 +297,40 @@ def _parameters(text: bytes) -> tuple[tuple[bytes, bool], ...]:
     return tuple(found)
 
 
-def _kind(word: bytes, code: bytes, at: int) -> tuple[str, Said]:
+def _kind(word: bytes, code: bytes, at: int) -> tuple[StatementKind, Said]:
     found: re.Match[bytes] | None
     if word in MOTIONS:
         # A variable may bear such a name only where no motion can stand.
-        return "motion", None
+        return StatementKind.MOTION, None
     if len(code) > LONGEST:
-        return "other", None
+        return StatementKind.OTHER, None
     if word in OPENS:
-        return "open", None
+        return StatementKind.OPEN, None
     if word in CLOSES:
-        return "close", None
+        return StatementKind.CLOSE, None
     if word in BRANCHES:
-        return "branch", None
+        return StatementKind.BRANCH, None
     if word in (b"DEF", b"DEFFCT", b"GLOBAL") and (found := _DEF.match(code)):
-        return "def", Head(found[1].upper(), _parameters(found[2] or b""))
+        return StatementKind.DEF, Head(found[1].upper(), _parameters(found[2] or b""))
     if word in (b"END", b"ENDFCT"):
-        return "end", None
+        return StatementKind.END, None
     if word == b"GOTO" and (found := _GOTO.match(code)):
-        return "goto", found[1].upper()
+        return StatementKind.GOTO, found[1].upper()
     if word in (b"EXIT", b"RETURN"):
-        return word.decode().lower(), None
-    if word in KEPT:
-        return "kept", None
+        return StatementKind(word.decode().lower()), None
+    if word in SYSTEM_WORDS:
+        return StatementKind.SYSTEM, None
     if word == b"DECL" or word in TYPES or word == b"GLOBAL":
         declared = declaration(code, at)
         if declared is not None:
-            return "declaration", declared
+            return StatementKind.DECLARATION, declared
     if (said := assignment(code, at)) is not None:
-        return "assignment", said
+        return StatementKind.ASSIGNMENT, said
     if found := _CALL.match(code):
-        return "call", Call(found[1].upper(), found[2])
+        return StatementKind.CALL, Call(found[1].upper(), found[2])
     if found := _LABEL.match(code):
-        return "label", found[1].upper()
-    return "other", None
+        return StatementKind.LABEL, found[1].upper()
+    return StatementKind.OTHER, None
 
 
 def assignment(code: bytes, at: int) -> Assignment | None:

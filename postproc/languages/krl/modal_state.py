@@ -91,11 +91,9 @@ NO_TOOL = UnknownValue("KRL005", "no $TOOL is set before it")
 
 @dataclass(frozen=True, slots=True)
 class InlineFormState:
-    """The start of the last inline form: the place of its fold, and base, tool and feed that are in force there."""
+    """The start of the last inline form: base and tool that are in force there."""
 
-    at: int
     frames: tuple[FrameIndex | UnknownValue, FrameIndex | UnknownValue]
-    feed: float
 
 
 @dataclass

@@ -16,7 +16,6 @@ from postproc.languages.krl.motion_refusals import (
 from postproc.languages.krl.motion_rows import NAN6, NO_ARC, MotionRow, RowRefusal, index, path_of, refusal
 from postproc.languages.krl.operands import Operand
 from postproc.languages.krl.partial import anchored, filled, incomplete, varying
-from postproc.languages.krl.source_map import InlineForm
 from postproc.languages.krl.spatial import Arc, Numbers
 from postproc.languages.krl.target import KrlTarget, UnknownValue
 from postproc.toolpath import ArcFrame, Kind
@@ -123,7 +122,7 @@ def enter_motion(
         _in_block(run, row)
     elif state.no_insert:
         rows.no_insert_before[row] = state.no_insert
-    elif statement.line in run.structure.inline and not _in_form(run, row):
+    elif statement.line in run.structure.inline and not _in_form(run):
         rows.no_insert_before[row] = "it is an inline form that sets another base or tool"
     state.no_insert = ""
     if partial or relative or operand.builds:
@@ -156,13 +155,10 @@ def _external(state: ModalState, target: KrlTarget | UnknownValue, relative: boo
     return apart(values) if state.external_apart and target.external else values
 
 
-def _in_form(run: ExecutionContext, row: int) -> bool:
-    """Notes the inline form to which a motion belongs; gives whether its base and tool are in force before it."""
+def _in_form(run: ExecutionContext) -> bool:
+    """Whether base and tool of a motion in an inline form are in force before that."""
     state, form = run.state, run.state.form
-    if form is None:
-        return False
-    run.rows.inline[row] = InlineForm(form.at, form.feed)
-    return form.frames == (state.base, state.tool)
+    return form is not None and form.frames == (state.base, state.tool)
 
 
 def _inherits(stated: KrlTarget | None, relative: bool) -> int:

@@ -10,7 +10,7 @@ from postproc.base.arrays import Floats
 from postproc.base.document import Document
 from postproc.languages.krl.external_axes import UNSTATED, carried_on, six
 from postproc.languages.krl.modal_state import Anchor, FrameIndex, ModalState, Source
-from postproc.languages.krl.source_map import Auxiliary, InlineForm, PointVariable, Relative
+from postproc.languages.krl.source_map import Auxiliary, PointVariable, Relative
 from postproc.languages.krl.spatial import Arc, Numbers
 from postproc.languages.krl.target import KrlTarget, UnknownValue
 from postproc.languages.krl.vectorised import VectorisedLines
@@ -97,7 +97,6 @@ class MotionRows:
     calls: list[tuple[int, frozenset[Source]]] = field(default_factory=list)
     unfollowed_ends: set[Source] = field(default_factory=set)
     never_from: int | None = None
-    inline: dict[int, InlineForm] = field(default_factory=dict)
     approximated: dict[int, float] = field(default_factory=dict)
     builds_on: dict[int, frozenset[Source]] = field(default_factory=dict)
     reads: list[tuple[int, frozenset[Source]]] = field(default_factory=list)
@@ -187,7 +186,7 @@ class MotionRows:
                 self.count -= size
         for sparse in (
             self.anchors, self.reasons, self.variables, self.locked, self.arcs, self.relative,
-            self.no_insert_before, self.inline, self.approximated, self.builds_on,
+            self.no_insert_before, self.approximated, self.builds_on,
             self.passing, self.entries, self.sources_of, self.stopped,
         ):  # fmt: skip
             while sparse and next(reversed(sparse)) >= count:

@@ -18,7 +18,7 @@ from postproc.languages.krl.data import (
     read_data,
     read_references,
 )
-from postproc.languages.krl.lexing import Call, Statement, split_values
+from postproc.languages.krl.lexing import Call, Statement, StatementKind, split_values
 from postproc.languages.krl.modal_state import ELSEWHERE, START, FrameIndex, FrameRegister, ModalState
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.predecessors import expanded
@@ -47,7 +47,7 @@ MOST_OUTCOMES = 2000
 MOST_ROUTINES = 200
 """Routines of other modules; where there are more, none is read: each is followed into all that it calls."""
 
-_MOTION = Statement("motion", b"", b"", 0, 0)
+_MOTION = Statement(StatementKind.MOTION, b"", b"", 0, 0)
 
 MODAL_FIELDS = (
     "base", "tool", "feed", "blend", "tool_known", "orientation", "arc_frame", "frames_record", "path_record",

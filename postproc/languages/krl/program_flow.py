@@ -21,6 +21,7 @@ from postproc.languages.krl.lexing import (
     Call,
     Declared,
     Statement,
+    StatementKind,
     has_foreign_letters,
     identifiers,
 )
@@ -177,10 +178,12 @@ class ProgramFlow(Calls):
                 if id(item) not in bulks:
                     self._anywhere()
                     motions.move_bulk(run, item)
-            elif item.kind == "motion" and item.line not in lines:
+            elif item.kind == StatementKind.MOTION and item.line not in lines:
                 self._anywhere()
                 motions.move(run, item)
-            elif item.kind == "strange" and item.line not in lines and run.structure.has_routine:
+            elif (
+                item.kind == StatementKind.UNREADABLE and item.line not in lines and run.structure.has_routine
+            ):
                 self._anywhere()
                 motions.unknown_motion(run, item)
 
@@ -215,15 +218,15 @@ class ProgramFlow(Calls):
         if run.walked and run.structure.aliases:
             self._forget_aliases(item)
         kind, said = item.kind, item.strings
-        if kind == "comment":
+        if kind == StatementKind.COMMENT:
             return pc + 1
-        if kind == "motion" and b"(" not in item.code and pc not in run.structure.events:
+        if kind == StatementKind.MOTION and b"(" not in item.code and pc not in run.structure.events:
             run.variables.line = item.line
             motions.move(run, item)
             return pc + 1
-        if kind != "motion":
+        if kind != StatementKind.MOTION:
             self._advance_run(pc, item)
-        if not item.code.isascii() and kind != "motion" and has_foreign_letters(item.code):
+        if not item.code.isascii() and kind != StatementKind.MOTION and has_foreign_letters(item.code):
             self._report_letters(item)
         run.variables.line = item.line
         if item.code in run.structure.ill_formed:
@@ -235,15 +238,15 @@ class ProgramFlow(Calls):
             there = self._block_event(pc, item)
             if there is not None or not self.reachable:
                 return pc + 1 if there is None else there
-        if kind == "motion":
+        if kind == StatementKind.MOTION:
             motions.move(run, item)
-        elif kind == "strange":
+        elif kind == StatementKind.UNREADABLE:
             if run.structure.has_routine:
                 motions.unknown_motion(run, item)
             run.forget(effects_of(item)[0], f"after line {item.line}, which is not understood")
-        elif kind == "foreign" and isinstance(said, Call):
+        elif kind == StatementKind.UMLAUT_NAME and isinstance(said, Call):
             self._called(item, said.name, identifiers(said.arguments))
-        elif kind == "foreign":
+        elif kind == StatementKind.UMLAUT_NAME:
             run.forget(
                 effects_of(item)[0], f"after line {item.line}, which contains letters that KRL does not have"
             )
@@ -253,19 +256,19 @@ class ProgramFlow(Calls):
             declare(run, said)
         elif isinstance(said, Call):
             return self._call(pc, item, said)
-        elif kind == "label" and isinstance(said, bytes):
+        elif kind == StatementKind.LABEL and isinstance(said, bytes):
             self._label(pc, item, said)
-        elif kind == "goto" and isinstance(said, bytes):
+        elif kind == StatementKind.GOTO and isinstance(said, bytes):
             return self._goto(pc, said)
-        elif kind == "exit":
+        elif kind == StatementKind.EXIT:
             return self._exit(pc)
-        elif kind in ("return", "end"):
-            return self._leave(pc, kind)
-        elif kind == "other" and item.word in (b"ASYPTP", b"ASYCONT"):
+        elif kind in (StatementKind.RETURN, StatementKind.END):
+            return self._leave(pc, kind == StatementKind.RETURN)
+        elif kind == StatementKind.OTHER and item.word in (b"ASYPTP", b"ASYCONT"):
             run.state.external = by_themselves(run.state.external, item.code)
         elif item.word == b"TIME_BLOCK" and run.spline is not None:
             run.state.feed = NAN  # the block takes a time
-        elif kind == "other" and run.structure.has_routine and HIDDEN.search(item.code):
+        elif kind == StatementKind.OTHER and run.structure.has_routine and HIDDEN.search(item.code):
             motions.unknown_motion(run, item)
         elif item.word in EVENTS:
             if item.word == b"TRIGGER":
@@ -302,16 +305,16 @@ class ProgramFlow(Calls):
         """Whether a CONTINUE is before a statement."""
         for before in range(pc - 1, -1, -1):
             item = self.run.code[before]
-            if isinstance(item, VectorisedLines) or item.kind != "comment":
+            if isinstance(item, VectorisedLines) or item.kind != StatementKind.COMMENT:
                 return isinstance(item, Statement) and item.word == b"CONTINUE"
         return False
 
     def _block_event(self, pc: int, item: Statement) -> int | None:
         """Opens, changes or closes blocks; gives where it goes on if that is not after the statement."""
         for what, block in self.run.structure.events[pc]:
-            if what == "open":
+            if what == StatementKind.OPEN:
                 return self._open(pc, item, block)
-            if what == "branch":
+            if what == StatementKind.BRANCH:
                 return self._branch(pc, block)
             again = self._close(item, block)
             if again is not None:
@@ -325,23 +328,22 @@ class ProgramFlow(Calls):
         if pc in self.run.structure.events:
             there = self._block_event(pc, item)
             return pc + 1 if there is None else there
-        if item.kind == "label" and isinstance(item.strings, bytes):
+        if item.kind == StatementKind.LABEL and isinstance(item.strings, bytes):
             self._label(pc, item, item.strings)
-        elif item.kind == "end":
-            return self._leave(pc, "end")
+        elif item.kind == StatementKind.END:
+            return self._leave(pc)
         return pc + 1
 
     def _comment(self, item: Statement) -> None:
         run = self.run
-        if run.structure.inline and item.kind == "comment" and INLINE.match(item.comment):
+        if run.structure.inline and item.kind == StatementKind.COMMENT and INLINE.match(item.comment):
             state = run.state
-            at = run.document.raw.rfind(b"\n", 0, item.at) + 1
-            state.form = InlineFormState(at, (state.base, state.tool), state.feed)
+            state.form = InlineFormState((state.base, state.tool))
         text = item.comment[1:].decode("latin-1").strip()
         note = Annotation(len(run.rows), text, item.line)
         if _ANNOTATION.match(item.comment):
             run.rows.annotations.append(note)
-        elif item.kind == "comment":
+        elif item.kind == StatementKind.COMMENT:
             self.comments.setdefault(item.line, note)
 
     def _later(self, item: Statement) -> None:

@@ -10,6 +10,7 @@ from types import MappingProxyType
 from postproc.languages.krl.aliases import Handed, Parameters, parameters_of, spread
 from postproc.languages.krl.later_changes import EVENTS, later_actions, later_functions
 from postproc.languages.krl.lexing import (
+    BEFORE_CASES,
     BRANCHES,
     CLOSES,
     FRAME_TABLES,
@@ -19,6 +20,7 @@ from postproc.languages.krl.lexing import (
     Declared,
     Head,
     Statement,
+    StatementKind,
     identifiers,
 )
 from postproc.languages.krl.program_blocks import Block, Routine
@@ -112,47 +114,47 @@ class _Surveyor:
 
     def take(self, index: int, statement: Statement) -> None:
         kind, stack = statement.kind, self.stack
-        if kind not in ("motion", "comment") and not is_well_formed(statement):
+        if kind not in (StatementKind.MOTION, StatementKind.COMMENT) and not is_well_formed(statement):
             self._ill_formed(statement)
         if stack and stack[-1].word == b"SWITCH" and not stack[-1].branches:
             self._before_first_case(statement)
-        if kind == "motion":
+        if kind == StatementKind.MOTION:
             if stack and not _stays(statement.code):
                 stack[-1].effects.add("point")
             if functions_of(statement):
                 self.note(statement)
             if self.inline:
                 self.found.inline.add(statement.line)
-        elif kind == "comment":
+        elif kind == StatementKind.COMMENT:
             self._fold(statement.comment)
-        elif kind == "def":
+        elif kind == StatementKind.DEF:
             self._routine(index, statement)
-        elif kind == "end":
+        elif kind == StatementKind.END:
             if not stack or not isinstance(stack[0], Routine):
                 self._close_all(index)
                 self.found.unclosed.append((statement.line, f"{_shown(statement.word)} has no DEF"))
             else:
                 self._close_all(index)
-        elif kind == "open":
+        elif kind == StatementKind.OPEN:
             self._open(index, statement)
-        elif kind == "branch":
+        elif kind == StatementKind.BRANCH:
             self.note(statement)
             if not self.buried and stack and stack[-1].word == BRANCHES[statement.word]:
                 if statement.code in self.found.ill_formed or functions_of(statement):
                     stack[-1].broken = True  # `ELSE IF` opens no block, and a CASE calls nothing
                 stack[-1].branches.append(index)
-                self.found.events[index] = [("branch", stack[-1])]
-        elif kind == "close":
+                self.found.events[index] = [(StatementKind.BRANCH, stack[-1])]
+        elif kind == StatementKind.CLOSE:
             self._close(index, statement)
-        elif kind == "goto":
+        elif kind == StatementKind.GOTO:
             if self.routine is not None and isinstance(statement.strings, bytes):
                 key = (self.routine.start, statement.strings)
                 self.found.jumps[key] = (self.found.jumps.get(key, (index, index))[0], index)
-        elif kind == "exit":
+        elif kind == StatementKind.EXIT:
             loop = next((block for block in reversed(stack) if block.word in LOOPS), None)
             if loop is not None:
                 loop.leaves = True
-        elif kind == "label" and isinstance(statement.strings, bytes):
+        elif kind == StatementKind.LABEL and isinstance(statement.strings, bytes):
             if self.routine is not None:
                 self.routine.labels.setdefault(statement.strings, (index, tuple(stack[1:])))
         else:
@@ -174,7 +176,7 @@ class _Surveyor:
 
     def _before_first_case(self, statement: Statement) -> None:
         block = self.stack[-1]
-        if not block.broken and statement.kind not in ("comment", "branch", "close", "end", "def"):
+        if not block.broken and statement.kind not in BEFORE_CASES:
             block.broken = True
             self.found.unclosed.append((statement.line, "a statement is between SWITCH and its first CASE"))
 
@@ -220,7 +222,7 @@ class _Surveyor:
         self.blocks.append(block)
         self.stack.append(block)
         self.note(statement)
-        self.found.events[index] = [("open", block)]
+        self.found.events[index] = [(StatementKind.OPEN, block)]
 
     def _close(self, index: int, statement: Statement) -> None:
         stack = self.stack
@@ -250,7 +252,7 @@ class _Surveyor:
             outer = closed[i + 1] if i + 1 < len(closed) else stack[-1]
             _join(outer.effects, block.effects)
             outer.calls |= block.calls
-        self.found.events.setdefault(index, []).extend(("close", block) for block in closed)
+        self.found.events.setdefault(index, []).extend((StatementKind.CLOSE, block) for block in closed)
 
     def _close_all(self, index: int) -> None:
         self.buried = 0

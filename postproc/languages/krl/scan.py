@@ -20,7 +20,7 @@ from postproc.base.batches import in_blocks
 from postproc.base.decimals import literals
 from postproc.base.document import BLOCK, Document, offset_type
 from postproc.languages.krl.external_axes import UNSTATED, six
-from postproc.languages.krl.lexing import Statement, statement
+from postproc.languages.krl.lexing import Statement, StatementKind, statement
 from postproc.languages.krl.spatial import Numbers
 from postproc.languages.krl.target import COMPONENTS, KrlTarget, parse
 from postproc.languages.krl.vectorised import Item, VectorisedLines
@@ -53,10 +53,10 @@ def scan(document: Document, fast: bool) -> Iterator[Item]:
     one."""
     items = _items(document, fast)
     for item in items:
-        if isinstance(item, Statement) and item.kind == "header":
+        if isinstance(item, Statement) and item.kind == StatementKind.HEADER:
             continue
         yield item
-        if not isinstance(item, Statement) or item.kind != "comment":
+        if not isinstance(item, Statement) or item.kind != StatementKind.COMMENT:
             break
     yield from items
 

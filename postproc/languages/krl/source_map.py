@@ -65,15 +65,6 @@ class Relative:
     in_tool: bool
 
 
-@dataclass(frozen=True, slots=True)
-class InlineForm:
-    """The inline form of a motion: ``at``, the offset in document 0 at which the line of its ``;FOLD`` starts, and the
-    feed [m/s] that is in force there, NaN where it is not known."""
-
-    at: int
-    feed: float
-
-
 @dataclass(frozen=True, eq=False)
 class KrlSourceMap:
     """Per row, N motions as in the toolpath; the motion lines themselves are in document 0.
@@ -93,8 +84,7 @@ class KrlSourceMap:
     variables: rows whose operand is no plain aggregate in the line.
     locked: row -> why the literals in place must not be edited (other code reads them, another program may): such a
     motion can only move with a point of its own.
-    arcs: auxiliary points.  relative: rows with relative text.  inline: motions in the fold of an inline form; what
-    is inserted before such a row is before the fold, where its base and tool are in force unless it is ``whole``.
+    arcs: auxiliary points.  relative: rows with relative text.
     """
 
     start: Offsets
@@ -109,4 +99,3 @@ class KrlSourceMap:
     locked: Mapping[int, str] = field(default_factory=dict)
     arcs: Mapping[int, Auxiliary] = field(default_factory=dict)
     relative: Mapping[int, Relative] = field(default_factory=dict)
-    inline: Mapping[int, InlineForm] = field(default_factory=dict)

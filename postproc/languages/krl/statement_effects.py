@@ -17,6 +17,7 @@ from postproc.languages.krl.lexing import (
     Call,
     Declared,
     Statement,
+    StatementKind,
     cached,
     identifiers,
     keyed,
@@ -63,8 +64,16 @@ _WORDS = frozenset(
     b"AND OR NOT EXOR B_AND B_OR B_NOT B_EXOR IF THEN WHILE UNTIL FOR TO STEP SWITCH CASE WAIT SEC RETURN".split()
 )
 _IN_MOTIONS = frozenset([b"CA", b"WITH", b"BAS"])
-_CALLING = frozenset(
-    ["assignment", "branch", "call", "declaration", "foreign", "open", "close", "return", "motion"]
+_CALLING = (
+    StatementKind.ASSIGNMENT,
+    StatementKind.BRANCH,
+    StatementKind.CALL,
+    StatementKind.DECLARATION,
+    StatementKind.UMLAUT_NAME,
+    StatementKind.OPEN,
+    StatementKind.CLOSE,
+    StatementKind.RETURN,
+    StatementKind.MOTION,
 )
 """Kinds of statement whose expressions may call functions, besides the words below."""
 _EVALUATING = frozenset(b"WAIT TRIGGER ANOUT ANIN DIGIN ASYPTP ASYCONT TIME_BLOCK".split())
@@ -148,7 +157,7 @@ def functions_of(statement: Statement) -> tuple[bytes, ...]:
         code = _DO.split(code, 1)[0]  # what it does later is looked at elsewhere
     if b"(" not in code:
         return ()
-    if statement.kind == "motion":
+    if statement.kind == StatementKind.MOTION:
         return tuple(name for name in called_in(code[len(statement.word) :]) if name not in _IN_MOTIONS)
     return called_in(code)
 
@@ -254,11 +263,13 @@ def effects_of(statement: Statement, known: Directions = MappingProxyType({})) -
             return effects_of_bas(said.arguments), b""
         words: Effects = set() if is_harmless(said.name) else set(returned_by(said, known))
         return words, said.name
-    if statement.kind == "open" and statement.word == b"FOR":
+    if statement.kind == StatementKind.OPEN and statement.word == b"FOR":
         counter = _COUNTER.match(statement.code)
         return ({counter[1].upper()} if counter else set()), b""
-    if statement.kind == "strange":
+    if statement.kind == StatementKind.UNREADABLE:
         return (set(EVERYTHING) if _MORE.search(statement.code) else {"point"}), b""
     if statement.word == b"RESUME":
         return {"resume"}, b""
-    return ({"point"} if statement.kind == "other" and HIDDEN.search(statement.code) else set()), b""
+    return (
+        {"point"} if statement.kind == StatementKind.OTHER and HIDDEN.search(statement.code) else set()
+    ), b""

@@ -9,16 +9,17 @@ from postproc.languages.krl.lexing import (
     BRANCHES,
     CLOSES,
     DECLARED,
-    KEPT,
     LONGEST,
     MOTIONS,
     NAME,
     OPENS,
     SPLINES,
+    SYSTEM_WORDS,
     Assignment,
     Call,
     Declared,
     Statement,
+    StatementKind,
     assignment,
     cached,
     split_values,
@@ -37,7 +38,13 @@ _FIELD = re.compile(rb"[ \t]*+" + NAME + rb"(?:[ \t]*+\[[^\[\]]*+\])?+(?=[ \t'\"
 _TYPE = re.compile(rb"[ \t]*+" + NAME + rb"[ \t]*+:")
 _DECLARATION = re.compile(rb"[ \t]*+(" + NAME + rb")[ \t]*+(?:\[([^\[\]]*+)\][ \t]*+)?+(?:=(.*))?+\Z", re.S)
 _RESERVED = (
-    MOTIONS | OPENS | CLOSES.keys() | BRANCHES.keys() | KEPT | ALONE | {b"GOTO", b"RETURN", b"THEN", b"DECL"}
+    MOTIONS
+    | OPENS
+    | CLOSES.keys()
+    | BRANCHES.keys()
+    | SYSTEM_WORDS
+    | ALONE
+    | {b"GOTO", b"RETURN", b"THEN", b"DECL"}
 ) - {b"INI", b"SIGNAL"}
 _SIGNS = frozenset([b"+", b"-", b"NOT", b"B_NOT"])
 _BINARY = frozenset(
@@ -76,7 +83,18 @@ _SWITCHED = re.compile(rb"INTERRUPT[ \t]++(?:ON|OFF|ENABLE|DISABLE)\b(.*)\Z", re
 def is_well_formed(statement: Statement) -> bool:
     """Whether every word of a statement that is no motion has a meaning at its place."""
     kind, code, said = statement.kind, statement.code, statement.strings
-    if kind in ("motion", "strange", "foreign", "comment", "label", "def") or len(code) > LONGEST:
+    if (
+        kind
+        in (
+            StatementKind.MOTION,
+            StatementKind.UNREADABLE,
+            StatementKind.UMLAUT_NAME,
+            StatementKind.COMMENT,
+            StatementKind.LABEL,
+            StatementKind.DEF,
+        )
+        or len(code) > LONGEST
+    ):
         return True
     if isinstance(said, Assignment):
         return _assigns(said)

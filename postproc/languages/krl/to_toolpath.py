@@ -27,9 +27,13 @@ from postproc.toolpath import (
     EditConstraints,
     FrameRef,
     Kind,
+    MotionSequence,
+    MotionSpeeds,
     OrientationControl,
     OrientationMode,
     PartialTargets,
+    ProgramComments,
+    Targets,
     Toolpath,
 )
 
@@ -61,15 +65,24 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
     continues = _read_only(continuous(rows, single))
     stopped = _stop(table, stopped_motions(rows, continues))
     toolpath = Toolpath(
-        kind=_read_only(table.kind),
-        position=_read_only(table.position),
-        rotation=_read_only(table.rotation),
-        axes=FewRows(np.array(list(table.axes), np.int32), _read_only(axes), n),
-        feed=_read_only(table.feed),
-        base=_read_only(table.base),
-        tool=_read_only(table.tool),
+        targets=Targets(
+            kind=_read_only(table.kind),
+            position=_read_only(table.position),
+            rotation=_read_only(table.rotation),
+            axes=FewRows(np.array(list(table.axes), np.int32), _read_only(axes), n),
+            base=_read_only(table.base),
+            tool=_read_only(table.tool),
+            frames=used,
+            external=_read_only(table.external),
+        ),
         line=_read_only(table.line),
-        frames=used,
+        speeds=MotionSpeeds(_read_only(table.feed)),
+        sequence=MotionSequence(
+            approximation=_read_only(table.blend),
+            stops=_stops(rows, table),
+            continues=continues,
+            predecessors=predecessors(rows, continues),
+        ),
         constraints=EditConstraints(
             refused=refused,
             locked=_locked(rows, table, refused),
@@ -78,7 +91,6 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
             orientation_programmed=_correctable_orientations(table),
             inserted_approximation=_read_only(table.inserted),
         ),
-        annotations=tuple(rows.annotations),
         partial_targets=PartialTargets(anchor, given),
         arcs=Arcs(
             centre=_sparse((n, 3), np.nan, {row: arc[:3] for row, arc in table.ways.items()}, MM),
@@ -86,14 +98,9 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
             sweep=_sparse((n,), np.nan, {row: arc[6] for row, arc in table.ways.items()}, DEG),
             frame=_read_only(table.arc_frame),
         ),
-        approximation=_read_only(table.blend),
-        comments=tuple(rows.comments),
-        continues=continues,
-        predecessors=predecessors(rows, continues),
-        stops=_stops(rows, table),
         configuration=Configuration({"status": _read_only(table.status), "turn": _read_only(table.turn)}),
         orientation_control=OrientationControl(mode=_read_only(table.orientation)),
-        external=_read_only(table.external),
+        remarks=ProgramComments(tuple(rows.annotations), tuple(rows.comments)),
     )
     found = None if table.spots is None else _places(rows, table, table.spots)
     return (
@@ -122,7 +129,6 @@ def _places(rows: MotionRows, table: MotionTable, spots: Spots) -> KrlSourceMap:
         locked=rows.locked,
         arcs=rows.arcs,
         relative=rows.relative,
-        inline=rows.inline,
     )
 
 

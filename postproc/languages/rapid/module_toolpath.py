@@ -28,7 +28,10 @@ from postproc.toolpath import (
     EditConstraints,
     FrameRef,
     Kind,
+    MotionSequence,
+    MotionSpeeds,
     OrientationControl,
+    Targets,
     Toolpath,
 )
 from postproc.toolpath.initial_state import Symbol
@@ -57,19 +60,32 @@ def module_toolpath(
     facts = rows.facts
     zone, stops = _zones(rows, continues, flow.waited)
     toolpath = Toolpath(
-        kind=kind,
-        position=position,
-        rotation=_rotations(rows.numbers[:, 3:]),
-        axes=FewRows(
-            np.array(sorted(rows.axes), np.int32),
-            np.array([rows.axes[row] for row in sorted(rows.axes)]).reshape(-1, 6) * DEG,
-            n,
+        targets=Targets(
+            kind=kind,
+            position=position,
+            rotation=_rotations(rows.numbers[:, 3:]),
+            axes=FewRows(
+                np.array(sorted(rows.axes), np.int32),
+                np.array([rows.axes[row] for row in sorted(rows.axes)]).reshape(-1, 6) * DEG,
+                n,
+            ),
+            base=rows.base,
+            tool=rows.tool,
+            frames=tuple(frames.refs),
+            external=rows.external,
         ),
-        feed=rows.per_row([fact.speed * MM for fact in facts], float),
-        base=rows.base,
-        tool=rows.tool,
         line=rows.lines,
-        frames=tuple(frames.refs),
+        speeds=MotionSpeeds(rows.per_row([fact.speed * MM for fact in facts], float)),
+        sequence=MotionSequence(
+            approximation=zone,
+            stops=stops,
+            continues=continues,
+            predecessors={
+                row: rows.before(row)
+                for row in np.flatnonzero(~continues).tolist()
+                if rows.fact(row).arguments is not None
+            },
+        ),
         arcs=arcs,
         constraints=EditConstraints(
             refused=refused,
@@ -80,17 +96,7 @@ def module_toolpath(
             mode=rows.per_row([fact.orientation for fact in facts], np.int8)
         ),
         configuration=Configuration({"quadrants": rows.quadrants, "cfx": rows.cfx}),
-        external=rows.external,
-        approximation=zone,
-        stops=stops,
-        continues=continues,
-        predecessors={
-            row: rows.before(row)
-            for row in np.flatnonzero(~continues).tolist()
-            if rows.fact(row).arguments is not None
-        },
-        annotations=remarks.annotations,
-        comments=remarks.comments,
+        remarks=remarks,
     )
     toolpath = only_used(toolpath)
     single = np.flatnonzero(~rows.texts.is_plain(np.arange(n)))

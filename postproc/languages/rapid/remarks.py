@@ -7,20 +7,20 @@ import re
 from postproc.base.byte_search import find_word
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
-from postproc.languages.core.row_facts import SPEAKS, PlacedRemarks
+from postproc.languages.core.row_facts import SPEAKS
 from postproc.languages.dialect import MARK
 from postproc.languages.rapid.declared_data import walk
 from postproc.languages.rapid.module_rows import ModuleRows
 from postproc.languages.rapid.propagation import Propagation
 from postproc.languages.rapid.syntax_tree import Remark
-from postproc.toolpath import Annotation
+from postproc.toolpath import Annotation, ProgramComments
 
 _MARKER = re.compile(rb"[ \t]*![ \t]*" + MARK.encode() + rb"[^\r\n]*")
 
 
 def put_remarks(
     document: Document, flow: Propagation, rows: ModuleRows
-) -> tuple[PlacedRemarks, list[Finding]]:
+) -> tuple[ProgramComments, list[Finding]]:
     """The comments at the rows before which they are run first.
 
     A motion that runs with another FORCE or COMPENSATE comment than the row before it has, gets that comment again;
@@ -52,7 +52,7 @@ def put_remarks(
     notes.sort(key=lambda note: note[:2])
     annotations = tuple(note for _, _, note in notes)
     comments, findings = _others(document, flow, rows)
-    return PlacedRemarks(annotations, comments), findings
+    return ProgramComments(annotations, comments), findings
 
 
 def _annotation(document: Document, row: int, remark: Remark) -> Annotation:

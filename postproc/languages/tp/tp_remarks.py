@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
-from postproc.languages.core.row_facts import SPEAKS, PlacedRemarks
+from postproc.languages.core.row_facts import SPEAKS
 from postproc.languages.dialect import MARK
 from postproc.languages.tp.tp_listing import TpListing
 from postproc.languages.tp.tp_propagation import TpPropagation
 from postproc.languages.tp.tp_rows import TpRows
 from postproc.languages.tp.tp_statements import TpMove, TpRemark
-from postproc.toolpath import Annotation
+from postproc.toolpath import Annotation, ProgramComments
 
 
 def annotate(
     document: Document, listing: TpListing, run: TpPropagation, rows: TpRows
-) -> tuple[PlacedRemarks, list[Finding]]:
+) -> tuple[ProgramComments, list[Finding]]:
     """The comments at the rows before which they are.
 
     A motion that runs with another FORCE or COMPENSATE comment than the last one in the text above it gets that comment
@@ -43,7 +43,7 @@ def annotate(
             row = int(rows.row_of[at])
             annotations += _repeated(rows, row, shown, document) if isinstance(one, TpMove) else []
             row += 1
-    return PlacedRemarks(tuple(annotations), tuple(comments)), findings
+    return ProgramComments(tuple(annotations), tuple(comments)), findings
 
 
 def _repeated(

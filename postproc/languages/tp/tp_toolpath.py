@@ -20,8 +20,11 @@ from postproc.languages.tp.tp_rows import TpRows
 from postproc.toolpath import (
     Configuration,
     EditConstraints,
+    MotionSequence,
+    MotionSpeeds,
     OrientationControl,
     OrientationMode,
+    Targets,
     Toolpath,
 )
 
@@ -41,19 +44,32 @@ def toolpath_of(
     wrist = np.array([move is not None and move.wrist for move in rows.moves], np.bool_)
     blend, stops = rows.approximations(continues)
     path = Toolpath(
-        kind=kinds,
-        position=position,
-        rotation=rotation,
-        axes=FewRows(
-            np.array(sorted(rows.axes), np.int32),
-            np.array([rows.axes[row] for row in sorted(rows.axes)]).reshape(-1, 6) * DEG,
-            n,
+        targets=Targets(
+            kind=kinds,
+            position=position,
+            rotation=rotation,
+            axes=FewRows(
+                np.array(sorted(rows.axes), np.int32),
+                np.array([rows.axes[row] for row in sorted(rows.axes)]).reshape(-1, 6) * DEG,
+                n,
+            ),
+            base=rows.base,
+            tool=rows.tool,
+            frames=tuple(rows.frames),
+            external=rows.external,
         ),
-        feed=rows.feed * MM,
-        base=rows.base,
-        tool=rows.tool,
         line=rows.lines,
-        frames=tuple(rows.frames),
+        speeds=MotionSpeeds(rows.feed * MM),
+        sequence=MotionSequence(
+            approximation=blend * MM,
+            stops=stops,
+            continues=continues,
+            predecessors={
+                row: rows.before(row)
+                for row in np.flatnonzero(~continues).tolist()
+                if rows.moves[row] is not None
+            },
+        ),
         arcs=arcs,
         constraints=EditConstraints(
             refused=refused,
@@ -64,17 +80,7 @@ def toolpath_of(
             mode=np.where(wrist, OrientationMode.JOINT, OrientationMode.VAR).astype(np.int8)
         ),
         configuration=Configuration({"nut": rows.nut, "revolutions": rows.revolutions}),
-        external=rows.external,
-        approximation=blend * MM,
-        stops=stops,
-        continues=continues,
-        predecessors={
-            row: rows.before(row)
-            for row in np.flatnonzero(~continues).tolist()
-            if rows.moves[row] is not None
-        },
-        annotations=remarks.annotations,
-        comments=remarks.comments,
+        remarks=remarks,
     )
     findings += grouped(refused, path.line)
     moving = moving_external(rows.external)

@@ -5,18 +5,27 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
+from postproc.base.units import MM
 from postproc.process.stock.cells import Stock
 from postproc.process.stock.compiled import compiled
-from postproc.process.stock.contact import BOUND, find_arcs, height_range, set_pose
+from postproc.process.stock.contact import (
+    BOUND,
+    CutterCircle,
+    SweepCutters,
+    find_arcs,
+    height_range,
+    set_pose,
+)
 from postproc.process.stock.distance import CUTTER, REMOVES
+
+DEEP, NARROW = 0.02 * MM, 0.3 * MM
+"""A collision is deeper than the first and wider than the second."""
 
 
 @compiled
-def collides(
-    stock: Stock, profile: Floats, part: int, pose: Floats, time: int, margin: float, least: float
-) -> bool:
-    """Whether a part (CUTTING, SHANK or HOLDER) at ``pose`` reaches deeper than ``margin`` [m] into what is left before
-    the sweep ``time``; what is narrower than ``least`` [m] is not seen.
+def collides(stock: Stock, profile: Floats, part: int, pose: Floats, time: int) -> bool:
+    """Whether a part (CUTTING, SHANK or HOLDER) at ``pose`` reaches deeper than ``DEEP`` into what is left before the
+    sweep ``time``; what is narrower than ``NARROW`` is not seen.
 
     profile (E, 8), pose (6, 3): as in ``find_contact``.
     """
@@ -50,12 +59,12 @@ def collides(
                     else:
                         r = element[2] + element[4] * np.sin(s / element[4])
                         height = element[3] - element[4] * np.cos(s / element[4])
-                    narrow = least / max(r, least)
-                    find_arcs(stock, pose, r, height, -np.pi, np.pi, time, margin, narrow, arc)
+                    narrow = NARROW / max(r, NARROW)
+                    find_arcs(stock, pose, CutterCircle(r, height, -np.pi, np.pi, DEEP, narrow), time, arc)
                     if arc[0] > 0.0:
                         return True
                     bound[top] = arc[BOUND]
-                if place == 0 or most + bound[top] + (s - a) <= 0.0 or s - a < least:
+                if place == 0 or most + bound[top] + (s - a) <= 0.0 or s - a < NARROW:
                     a, most = s, bound[top]
                     top -= 1
                 else:
@@ -66,17 +75,16 @@ def collides(
 
 @compiled
 def collisions(
-    stock: Stock, profiles: Floats, headings: Floats, sweep: Ints, share: Floats, part: Ints, margin: float,
-    least: float, found: Ints,
-) -> None:  # fmt: skip
+    stock: Stock, cutters: SweepCutters, sweep: Ints, share: Floats, part: Ints, found: Ints
+) -> None:
     """``found`` (K,): 1 where the ``part`` (K,) at the pose reaches into stock; what the sweep itself removes is gone.
 
-    sweep (K,) and the share (K,) of it; profiles (T, E, 8), headings (M, 3): as in ``contacts``.
+    sweep (K,) and the share (K,) of it.
     """
     pose = np.zeros((6, 3))
     for k in range(len(sweep)):
         j = sweep[k]
-        set_pose(stock.sweeps, j, share[k], headings[j], pose)
+        set_pose(stock.sweeps, j, share[k], cutters.headings[j], pose)
         time = j + 1 if stock.sweeps[j, REMOVES] > 0.0 else j
-        profile = profiles[int(stock.sweeps[j, CUTTER])]
-        found[k] = 1 if collides(stock, profile, part[k], pose, time, margin, least) else 0
+        profile = cutters.profiles[int(stock.sweeps[j, CUTTER])]
+        found[k] = 1 if collides(stock, profile, part[k], pose, time) else 0

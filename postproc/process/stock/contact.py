@@ -18,6 +18,8 @@ look.  The profile is halved likewise until the integrals no longer change, so t
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
@@ -53,6 +55,44 @@ _MOST_PARTS = 32
 
 # of a circle: integrals of 1, sin, cos, sin2, sin cos, cos2; largest distance seen and possible; extent
 _GREATEST, BOUND, _FIRST, _LAST, _MOST_LEFT, _MOST_RIGHT = range(6, 12)
+
+
+class SweepCutters(NamedTuple):
+    """What cuts in M sweeps, by T cutters.
+
+    profiles (T, E, 8): see ``Cutter.profile``, unused rows with the part 9; laws (M, 9), live (M, 2): as of
+    ``SweepCutter``; headings (M, 3): x of the feed frames where the feed is along z.
+    """
+
+    profiles: Floats
+    laws: Floats
+    live: Floats
+    headings: Floats
+
+
+class SweepCutter(NamedTuple):
+    """What cuts in one sweep.
+
+    profile (E, 8): see ``Cutter.profile``; law (9,): feed per tooth [m], teeth, sign of the helix, Ktc, Krc, Kac [Pa],
+    Kte, Kre, Kae [N/m]; live (2,): heights [m] between which there may be stock; time: the sweep.
+    """
+
+    profile: Floats
+    law: Floats
+    live: Floats
+    time: int
+
+
+class CutterCircle(NamedTuple):
+    """The part of a circle of a cutter in which stock is looked for: radius and height above the tip [m], the first and
+    the last angle [rad]; stock of at least ``margin`` [m] outside counts, on arcs down to ``least`` [rad]."""
+
+    radius: float
+    height: float
+    low: float
+    high: float
+    margin: float
+    least: float
 
 
 @compiled
@@ -135,12 +175,10 @@ def _add_above_zero(arc: Floats, a: float, ga: float, b: float, gb: float, r: fl
 
 
 @compiled
-def find_arcs(
-    stock: Stock, pose: Floats, r: float, height: float, low: float, high: float, time: int,
-    margin: float, least: float, arc: Floats,
-) -> None:  # fmt: skip
-    """The arcs between the angles ``low`` and ``high`` with stock of at least ``margin`` [m] outside, down to ``least``
-    [rad], put into ``arc`` (12,): integrals, extremes and ends.  pose (6, 3): of ``set_pose``."""
+def find_arcs(stock: Stock, pose: Floats, circle: CutterCircle, time: int, arc: Floats) -> None:
+    """The arcs of ``circle`` with stock before the sweep ``time``, put into ``arc`` (12,): integrals, extremes and
+    ends.  pose (6, 3): of ``set_pose``."""
+    r, height, low, high, margin, least = circle
     arc[:] = 0.0
     arc[_GREATEST], arc[BOUND], arc[_FIRST], arc[_LAST] = -np.inf, -np.inf, np.inf, -np.inf
     arc[_MOST_LEFT], arc[_MOST_RIGHT] = -np.inf, np.inf
@@ -194,10 +232,10 @@ _NODE = 13
 
 @compiled
 def _set_node(
-    stock: Stock, element: Floats, s: float, pose: Floats, law: Floats, time: int,
-    contact: Floats, arc: Floats, node: Floats,
-) -> None:  # fmt: skip
-    """What the circle at the length ``s`` [m] of a profile element adds, by the metre of profile."""
+    stock: Stock, cutter: SweepCutter, e: int, s: float, pose: Floats, contact: Floats, node: Floats
+) -> None:
+    """What the circle at the length ``s`` [m] of the element ``e`` of a profile adds, by the metre of profile."""
+    element, law, arc = cutter.profile[e], cutter.law, np.zeros(12)
     if element[1] == 0.0:
         share = s / element[7]
         r = element[2] + share * (element[4] - element[2])
@@ -216,7 +254,8 @@ def _set_node(
         return
     middle = np.arctan2(a, b)
     half = np.pi if c >= size else np.arccos(-c / size)
-    find_arcs(stock, pose, r, height, middle - half, middle + half, time, _LEAST_STOCK, _LEAST_ARC, arc)
+    circle = CutterCircle(r, height, middle - half, middle + half, _LEAST_STOCK, _LEAST_ARC)
+    find_arcs(stock, pose, circle, cutter.time, arc)
     node[_SEEN], node[_MOST] = arc[_GREATEST], arc[BOUND]
     if arc[0] <= 0.0:
         return
@@ -284,18 +323,12 @@ def height_range(element: Floats, low: float, high: float) -> tuple[float, float
 
 
 @compiled
-def find_contact(
-    stock: Stock, profile: Floats, pose: Floats, law: Floats, live: Floats, time: int, contact: Floats
-) -> None:  # fmt: skip
-    """The contact of one pose put into ``contact`` (COLUMNS,).
-
-    profile: see ``Cutter.profile``; law (9,): feed per tooth [m], teeth, sign of the helix, Ktc, Krc, Kac [Pa],
-    Kte, Kre, Kae [N/m]; live (2,): heights [m] between which there may be stock; time: the sweep.
-    """
+def find_contact(stock: Stock, cutter: SweepCutter, pose: Floats, contact: Floats) -> None:
+    """The contact of one pose (6, 3), as of ``set_pose``, put into ``contact`` (COLUMNS,)."""
+    profile, live = cutter.profile, cutter.live
     contact[:] = 0.0
     contact[LOW], contact[HIGH], contact[ENTRY], contact[EXIT] = np.inf, -np.inf, np.inf, -np.inf
     contact[RIGHT], contact[LEFT] = np.inf, -np.inf
-    arc = np.zeros(12)
     left, middle, total = np.zeros(_NODE), np.zeros(_NODE), np.zeros(8)
     nodes, starts, rough = np.zeros((64, _NODE)), np.zeros((_MOST_PARTS + 1, _NODE)), np.zeros(8)
     for e in range(len(profile)):
@@ -313,7 +346,7 @@ def find_contact(
         rough[:] = 0.0
         for part in range(parts + 1):
             s = first + (last - first) * part / parts
-            _set_node(stock, element, s, pose, law, time, contact, arc, starts[part])
+            _set_node(stock, cutter, e, s, pose, contact, starts[part])
             weight = (last - first) / parts * (0.5 if part in (0, parts) else 1.0)
             for k in range(8):
                 rough[k] += weight * starts[part, _SUM + k]
@@ -333,9 +366,7 @@ def find_contact(
                         total[k] += 0.5 * wide * (left[_SUM + k] + right[_SUM + k])
                     done = True
                 if not done:
-                    _set_node(
-                        stock, element, 0.5 * (left[_AT] + right[_AT]), pose, law, time, contact, arc, middle
-                    )
+                    _set_node(stock, cutter, e, 0.5 * (left[_AT] + right[_AT]), pose, contact, middle)
                     if empty and middle[_TOUCHES] == 0.0:
                         done = (
                             abs(left[_SEEN]) < NEAR_ZERO
@@ -373,15 +404,11 @@ def find_contact(
 
 
 @compiled
-def contacts(
-    stock: Stock, profiles: Floats, laws: Floats, live: Floats, headings: Floats, sweep: Ints, share: Floats,
-    found: Floats,
-) -> None:  # fmt: skip
-    """``found`` (K, COLUMNS) of K poses: sweep (K,) and the share (K,) of it; profiles (T, E, 8), unused rows with the
-    part 9; laws (M, 9), live (M, 2), headings (M, 3): of the sweeps."""
+def contacts(stock: Stock, cutters: SweepCutters, sweep: Ints, share: Floats, found: Floats) -> None:
+    """``found`` (K, COLUMNS) of K poses: sweep (K,) and the share (K,) of it."""
     pose = np.zeros((6, 3))
     for k in range(len(sweep)):
         j = sweep[k]
-        set_pose(stock.sweeps, j, share[k], headings[j], pose)
-        profile = profiles[int(stock.sweeps[j, CUTTER])]
-        find_contact(stock, profile, pose, laws[j], live[j], j, found[k])
+        set_pose(stock.sweeps, j, share[k], cutters.headings[j], pose)
+        profile = cutters.profiles[int(stock.sweeps[j, CUTTER])]
+        find_contact(stock, SweepCutter(profile, cutters.laws[j], cutters.live[j], j), pose, found[k])

@@ -22,7 +22,15 @@ import numpy as np
 from postproc.base.arrays import Floats, Ints
 from postproc.process.stock.cells import Stock
 from postproc.process.stock.compiled import compiled
-from postproc.process.stock.contact import COLUMNS, FORCE, NEAR_ZERO, RATE, find_contact, set_pose
+from postproc.process.stock.contact import (
+    COLUMNS,
+    FORCE,
+    NEAR_ZERO,
+    RATE,
+    SweepCutter,
+    find_contact,
+    set_pose,
+)
 from postproc.process.stock.displaced import displace_row
 from postproc.process.stock.distance import CUTTER, rotated, speed_bound
 
@@ -54,7 +62,7 @@ _ALONG_SPINDLE = 0.0174524  # within a degree of it no direction across it is kn
 class Pieces(NamedTuple):
     """P pieces of sweeps in the order in which they run.
 
-    rows (P, ROW): as programmed; laws (P, 9), live (P, 2), heading (P, 3): as of ``find_contact``; start, end (P,):
+    rows (P, ROW): as programmed; laws (P, 9), live (P, 2), heading (P, 3): as of ``SweepCutters``; start, end (P,):
     their nodes; fresh (P,): 1 where the node at the start is solved, 0 where it is the end of the piece before;
     earlier: sweeps of the stock before the first of them; known: 1 where the wrenches of the nodes are near the
     solution, 0 where that of the place before is a better guess.
@@ -86,6 +94,21 @@ class Nodes(NamedTuple):
     area: Floats
 
 
+class ToolAtNode(NamedTuple):
+    """The tool at one node, and what its displacements are tried with.
+
+    pose (6, 3): as programmed, of ``set_pose``; came (4,): displacement [m] from which the tool comes, and the length
+    [m] of its path since, 0 where it is not known; moved (6, 3), contact (COLUMNS,): of the displacement tried last.
+    """
+
+    stock: Stock
+    cutter: SweepCutter
+    pose: Floats
+    came: Floats
+    moved: Floats
+    contact: Floats
+
+
 @compiled
 def solve_pieces(stock: Stock, profiles: Floats, pieces: Pieces, nodes: Nodes, lever: float) -> None:
     """Solve the nodes of all pieces in their order, and put the displaced pieces into the sweeps of ``stock``.
@@ -93,39 +116,40 @@ def solve_pieces(stock: Stock, profiles: Floats, pieces: Pieces, nodes: Nodes, l
     profiles (T, E, 8): as of ``contacts``; lever [m]: how far from the tip a turn of the tool counts.
     """
     pose, came = np.zeros((6, 3)), np.zeros(4)
+    moved, contact = np.zeros((6, 3)), np.zeros(COLUMNS)
     first, last, whole = np.zeros(6), np.zeros(6), np.array([0.0, 1.0])
     for p in range(len(pieces.rows)):
         profile = profiles[int(pieces.rows[p, CUTTER])]
-        law, live, time = pieces.laws[p], pieces.live[p], pieces.earlier + p
+        time = pieces.earlier + p
+        cutter = SweepCutter(profile, pieces.laws[p], pieces.live[p], time)
+        tool = ToolAtNode(stock, cutter, pose, came, moved, contact)
         a, b = pieces.start[p], pieces.end[p]
         if pieces.fresh[p] > 0:
             set_pose(pieces.rows, p, 0.0, pieces.heading[p], pose)
             came[3] = 0.0
-            _solve(stock, profile, pose, came, law, live, time, nodes, a, a, lever)
+            _solve(tool, nodes, a, a, lever)
         _displacement(nodes, a, nodes.wrench[a], first)
         came[:3], came[3] = first[:3], speed_bound(pieces.rows, p, 0.0)
         set_pose(pieces.rows, p, 1.0, pieces.heading[p], pose)
         if pieces.known == 0:
             nodes.wrench[b, :] = nodes.wrench[a]
-        _solve(stock, profile, pose, came, law, live, time, nodes, a, b, lever)
+        _solve(tool, nodes, a, b, lever)
         if came[3] > 0.0 and nodes.residual[b] > max(
             UNSETTLED, LOST * _size(nodes.slope[b], nodes.wrench[b], lever)
         ):
-            _solve_as_programmed(stock, profile, pose, law, live, time, nodes, a, b, lever)
+            _solve_as_programmed(tool, nodes, a, b, lever)
         _displacement(nodes, b, nodes.wrench[b], last)
         displace_row(pieces.rows, p, whole, first, last, lever, AS_STRAIGHT, stock.sweeps[time])
 
 
 @compiled
-def _solve_as_programmed(
-    stock: Stock, profile: Floats, pose: Floats, law: Floats, live: Floats, time: int, nodes: Nodes,
-    before: int, k: int, lever: float,
-) -> None:  # fmt: skip
+def _solve_as_programmed(tool: ToolAtNode, nodes: Nodes, before: int, k: int, lever: float) -> None:
     """The wrench of node ``k`` with the direction and the chip of the programmed feed, where its own have no
-    equilibrium; what remains of these stays its residual."""
-    rest, came = nodes.residual[k], np.zeros(4)
+    equilibrium; what remains of these stays its residual.  From where the tool comes is no longer known."""
+    rest = nodes.residual[k]
+    tool.came[3] = 0.0
     nodes.wrench[k, :] = nodes.wrench[before]
-    _solve(stock, profile, pose, came, law, live, time, nodes, before, k, lever)
+    _solve(tool, nodes, before, k, lever)
     nodes.residual[k] = rest
 
 
@@ -153,14 +177,9 @@ def _size(slope: Floats, wrench: Floats, lever: float) -> float:
 
 
 @compiled
-def _met(
-    stock: Stock, profile: Floats, pose: Floats, came: Floats, law: Floats, live: Floats, time: int, nodes: Nodes,
-    k: int, wrench: Floats, moved: Floats, contact: Floats, out: Floats,
-) -> float:  # fmt: skip
-    """``out`` (6,): the wrench that the tool meets where ``wrench`` (6,) displaces it to; the removed area [m2].
-
-    came (4,): displacement [m] from which the tool comes, and the length [m] of its path since, 0 where it is not
-    known."""
+def _met(tool: ToolAtNode, nodes: Nodes, k: int, wrench: Floats, out: Floats) -> float:
+    """``out`` (6,): the wrench that the tool meets where ``wrench`` (6,) displaces it to; the removed area [m2]."""
+    pose, moved, contact = tool.pose, tool.moved, tool.contact
     d = np.zeros(6)
     _displacement(nodes, k, wrench, d)
     moved[:] = pose
@@ -169,9 +188,9 @@ def _met(
     for axis in range(1, 4):
         x, y, z = rotated(pose[axis, 0], pose[axis, 1], pose[axis, 2], d[3], d[4], d[5], 1.0)
         moved[axis, 0], moved[axis, 1], moved[axis, 2] = x, y, z
-    if came[3] > 0.0:
-        _set_own_velocity(profile, pose, came, moved)
-    find_contact(stock, profile, moved, law, live, time, contact)
+    if tool.came[3] > 0.0:
+        _set_own_velocity(tool.cutter.profile, pose, tool.came, moved)
+    find_contact(tool.stock, tool.cutter, moved, contact)
     out[:] = 0.0
     if contact[RATE] <= LEAST_AREA:
         return 0.0
@@ -219,24 +238,19 @@ def _set_own_velocity(profile: Floats, pose: Floats, came: Floats, moved: Floats
 
 
 @compiled
-def _solve(
-    stock: Stock, profile: Floats, pose: Floats, came: Floats, law: Floats, live: Floats, time: int, nodes: Nodes,
-    before: int, k: int, lever: float,
-) -> None:  # fmt: skip
+def _solve(tool: ToolAtNode, nodes: Nodes, before: int, k: int, lever: float) -> None:
     """The fixed point at node ``k``, from its wrench on, or from that of the node ``before``."""
-    moved, contact = np.zeros((6, 3)), np.zeros(COLUMNS)
     slope = nodes.slope[k]
     w, g, g_before = np.zeros(6), np.zeros(6), np.zeros(6)
     r, r_before = np.zeros(6), np.zeros(6)
     w[:] = nodes.wrench[k]
     best = np.inf
-    turning = (
-        max(_size(slope, w, lever), _size(slope, nodes.wrench[before], lever)) > _TURNING * came[3] > 0.0
-    )
-    if turning and _settle_turning(stock, profile, pose, came, law, live, time, nodes, before, k, lever):
+    displaced = max(_size(slope, w, lever), _size(slope, nodes.wrench[before], lever))
+    turning = displaced > _TURNING * tool.came[3] > 0.0
+    if turning and _settle_turning(tool, nodes, before, k, lever):
         return
     for step in range(0 if turning else _STEPS):
-        area = _met(stock, profile, pose, came, law, live, time, nodes, k, w, moved, contact, g)
+        area = _met(tool, nodes, k, w, g)
         r[:] = g - w
         size = _size(slope, r, lever)
         limit = SETTLED + OF_DISPLACEMENT * _size(slope, g, lever)
@@ -263,17 +277,13 @@ def _solve(
         r_before[:] = r
         w[:] = g - theta * (g - g_before)
         g_before[:] = g
-    _bracket(stock, profile, pose, came, law, live, time, nodes, k, lever)
+    _bracket(tool, nodes, k, lever)
 
 
 @compiled
-def _settle_turning(
-    stock: Stock, profile: Floats, pose: Floats, came: Floats, law: Floats, live: Floats, time: int, nodes: Nodes,
-    before: int, k: int, lever: float,
-) -> bool:  # fmt: skip
+def _settle_turning(tool: ToolAtNode, nodes: Nodes, before: int, k: int, lever: float) -> bool:
     """The fixed point at node ``k`` by damped steps along the derivative of what remains by the force; whether it
     settles.  The node keeps the best that was seen."""
-    moved, contact = np.zeros((6, 3)), np.zeros(COLUMNS)
     slope = nodes.slope[k]
     w, g, r = np.zeros(6), np.zeros(6), np.zeros(6)
     trial, varied = nodes.wrench[before].copy(), np.zeros(6)
@@ -283,7 +293,7 @@ def _settle_turning(
     for start in range(2):  # from where the force was, or from where it is expected
         if start == 1:
             trial[:] = nodes.wrench[k]
-        area = _met(stock, profile, pose, came, law, live, time, nodes, k, trial, moved, contact, varied)
+        area = _met(tool, nodes, k, trial, varied)
         size = _size(slope, varied - trial, lever)
         if size < best:
             best, at_best = size, area
@@ -303,7 +313,7 @@ def _settle_turning(
                     continue
                 trial[:] = w
                 trial[j] += aside / unit
-                _met(stock, profile, pose, came, law, live, time, nodes, k, trial, moved, contact, varied)
+                _met(tool, nodes, k, trial, varied)
                 for i in range(6):
                     change[i, j] = (varied[i] - g[i]) * unit / aside
             fresh = True
@@ -332,7 +342,7 @@ def _settle_turning(
             trial[3 + i] = g[3 + i]
             for j in range(3):
                 trial[3 + i] += change[3 + i, j] * force[j]
-        area = _met(stock, profile, pose, came, law, live, time, nodes, k, trial, moved, contact, varied)
+        area = _met(tool, nodes, k, trial, varied)
         size = _size(slope, varied - trial, lever)
         if size < best:
             # a derivative that foretold well is used again
@@ -372,17 +382,13 @@ def _triple(a: Floats, b: Floats, c: Floats) -> float:
 
 
 @compiled
-def _bracket(
-    stock: Stock, profile: Floats, pose: Floats, came: Floats, law: Floats, live: Floats, time: int, nodes: Nodes,
-    k: int, lever: float,
-) -> None:  # fmt: skip
+def _bracket(tool: ToolAtNode, nodes: Nodes, k: int, lever: float) -> None:
     """The fixed point at node ``k`` where steps do not settle: the size of the wrench bracketed in its direction,
     which then is turned.  The node keeps what it has where this comes no closer."""
-    moved, contact = np.zeros((6, 3)), np.zeros(COLUMNS)
     slope = nodes.slope[k]
     g, w, unit, inner = np.zeros(6), np.zeros(6), np.zeros(6), np.zeros(6)
     best = nodes.residual[k]
-    area = _met(stock, profile, pose, came, law, live, time, nodes, k, w, moved, contact, unit)
+    area = _met(tool, nodes, k, w, unit)
     for _ in range(_TURNS):
         square = _along(slope, unit, unit)
         full = _size(slope, unit, lever)
@@ -396,7 +402,7 @@ def _bracket(
         for _ in range(_HALVINGS):
             scale = high if widening else 0.5 * (low + high)
             w[:] = scale * unit
-            area = _met(stock, profile, pose, came, law, live, time, nodes, k, w, moved, contact, g)
+            area = _met(tool, nodes, k, w, g)
             size = _size(slope, g - w, lever)
             if size < best:
                 best = size

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from postproc.process.stock.contact import (
     LOW,
     RATE,
     RIGHT,
+    SweepCutters,
     contacts,
 )
 from postproc.process.stock.cutters import CUTTING, HOLDER, SHANK, Cutter
@@ -53,9 +55,6 @@ _AT_START = 1e-2
 
 LEAST_AREA = 1e-5 * MM**2
 """Across the feed: below it nothing is cut."""
-
-DEEP, NARROW = 0.02 * MM, 0.3 * MM
-"""A collision is deeper than the first and wider than the second."""
 
 _MOST_PLACES = 64  # of one sweep
 _BLOCK = 64  # places that a thread takes at a time
@@ -90,6 +89,30 @@ class EngagedMotions:
     uneven: Ints
 
 
+class PlacesInStock(NamedTuple):
+    """K places that were looked at: their sweeps (K,), the lengths of path [m] that they represent, weight (K,), and
+    their contacts (K, COLUMNS)."""
+
+    sweep: Ints
+    weight: Floats
+    contact: Floats
+
+    @property
+    def rate(self) -> Floats:
+        """(K,) [m2] the removed area across the feed."""
+        return self.contact[:, RATE]
+
+    def of(self, some: Bools) -> PlacesInStock:
+        """Those of a mask (K,)."""
+        return PlacesInStock(self.sweep[some], self.weight[some], self.contact[some])
+
+    def joined(self, other: PlacesInStock) -> PlacesInStock:
+        """These and the others, in the order of the sweeps."""
+        sweep, weight, contact = (np.concatenate(pair) for pair in zip(self, other, strict=True))
+        order = np.argsort(sweep, kind="stable")
+        return PlacesInStock(sweep[order], weight[order], contact[order])
+
+
 def engage(
     blank: Blank,
     sweeps: MotionSweeps,
@@ -111,6 +134,7 @@ def engage(
     laws = laws_of(sweeps, toolpath, edges)
     padded = np.concatenate([np.zeros((earlier, 9)), laws])
     heading = np.concatenate([np.zeros((earlier, 3)), sweeps.heading])
+    cutting = SweepCutters(profiles, padded, live, heading)
 
     radius = np.array([cutter.radius for cutter in sweeps.cutters])[sweeps.rows[:, CUTTER].astype(int)]
     active = live[earlier:, 0] <= live[earlier:, 1]
@@ -120,36 +144,34 @@ def engage(
         found = np.zeros((len(sweep), COLUMNS))
 
         def each(part: slice) -> None:
-            contacts(stock, profiles, padded, live, heading, earlier + sweep[part], share[part], found[part])
+            contacts(stock, cutting, earlier + sweep[part], share[part], found[part])
 
         each_block(each, len(sweep), _BLOCK)
         return found
 
-    def look_at(chosen: Ints) -> tuple[Ints, Floats, Floats]:
-        """The sweep of each place, the length of path that it represents, and its contact."""
+    def look_at(chosen: Ints) -> PlacesInStock:
         sweep, share, weight = _places(sweeps, radius, chosen)
-        return sweep, weight, look(sweep, share)
+        return PlacesInStock(sweep, weight, look(sweep, share))
 
     def middles(some: Ints) -> Floats:
-        return look_at(some)[2]
+        return look_at(some).contact
 
     chosen = np.flatnonzero(active & (sweeps.rows[:, REMOVES] > 0))
     short = sweeps.length[chosen] <= SPACING * radius[chosen]
     long = look_at(chosen[~short])
     short_sweeps = chosen[short]
     seen = chain_contacts(sweeps, laws, short_sweeps, SPACING * radius, ALIKE, middles)
-    pairs = zip(long, (short_sweeps, sweeps.length[short_sweeps], seen), strict=True)
-    sweep, weight, found = _in_order(*(np.concatenate(pair) for pair in pairs))
-    uneven = np.union1d(_uneven(sweep, found[:, RATE]), _missed(sweep, found[:, RATE], look))
-    again = np.isin(sweep, uneven)
-    finer = _look_closer(sweeps, radius, uneven, look)
-    pairs = zip((sweep[~again], weight[~again], found[~again]), finer, strict=True)
-    sweep, weight, found = _in_order(*(np.concatenate(pair) for pair in pairs))
-    hits = _hits(stock, sweeps, profiles, heading, live, earlier, radius)
+    places = long.joined(PlacesInStock(short_sweeps, sweeps.length[short_sweeps], seen))
+    uneven = np.union1d(_uneven(places.sweep, places.rate), _missed(places.sweep, places.rate, look))
+    again = np.isin(places.sweep, uneven)
+    places = places.of(~again).joined(_look_closer(sweeps, radius, uneven, look))
+    hits = _hits(stock, sweeps, cutting, earlier, radius)
     speed = speeds_of(sweeps, toolpath, edges)
-    cut = _by_motion(len(toolpath), sweeps, sweep, weight, found, laws, speed, hits, stock)
-    changing = np.isin(sweeps.motion[sweep], sweeps.motion[uneven])
-    forces = profiles_of_places(sweeps, sweep[changing], weight[changing], found[changing, FORCE : FORCE + 6])
+    cut = _by_motion(len(toolpath), sweeps, places, laws, speed, hits, stock)
+    changing = places.of(np.isin(sweeps.motion[places.sweep], sweeps.motion[uneven]))
+    forces = profiles_of_places(
+        sweeps, changing.sweep, changing.weight, changing.contact[:, FORCE : FORCE + 6]
+    )
     along = cut.along.copy()
     known = ~np.isnan(cut.mean[forces.motion, 0])
     for side, share in enumerate((0.0, 1.0)):
@@ -206,11 +228,6 @@ def _uneven(sweep: Ints, rate: Floats) -> Ints:
     return sweep[first][most - least > UNEVEN * most]
 
 
-def _in_order(sweep: Ints, weight: Floats, found: Floats) -> tuple[Ints, Floats, Floats]:
-    order = np.argsort(sweep, kind="stable")
-    return sweep[order], weight[order], found[order]
-
-
 def _missed(sweep: Ints, rate: Floats, look: Callable[[Ints, Floats], Floats]) -> Ints:
     """The sweeps with an end that cuts, or does not, unlike the place (K,) next to it: a plunge that just reaches
     stock, or one that starts just above.  Where a sweep that cuts goes on in one that does, its end is not looked
@@ -231,7 +248,7 @@ def _missed(sweep: Ints, rate: Floats, look: Callable[[Ints, Floats], Floats]) -
 
 def _look_closer(
     sweeps: MotionSweeps, radius: Floats, uneven: Ints, look: Callable[[Ints, Floats], Floats]
-) -> tuple[Ints, Floats, Floats]:
+) -> PlacesInStock:
     """As ``look_at`` in ``engage``, FINER times closer and at both ends.
 
     Where the removed area steps between two places, as a face is met at once, the lengths that they represent meet at
@@ -259,7 +276,7 @@ def _look_closer(
     shift = 0.5 * (low + high) * sweeps.length[sweep[at]] - (total[at] - before)
     np.add.at(weight, at, shift)
     np.subtract.at(weight, at + 1, shift)
-    return sweep, weight, found
+    return PlacesInStock(sweep, weight, found)
 
 
 def _places(
@@ -275,13 +292,7 @@ def _places(
 
 
 def _hits(
-    stock: Stock,
-    sweeps: MotionSweeps,
-    profiles: Floats,
-    heading: Floats,
-    live: Floats,
-    earlier: int,
-    radius: Floats,
+    stock: Stock, sweeps: MotionSweeps, cutting: SweepCutters, earlier: int, radius: Floats
 ) -> dict[int, tuple[int, ...]]:
     """Row of a motion -> the parts of the tool that collide with stock along it."""
     rows = sweeps.rows
@@ -290,9 +301,10 @@ def _hits(
     )
     above = _highest_stock(stock, rows) > top[rows[:, CUTTER].astype(int)]
     rapid = rows[:, REMOVES] == 0
-    tried = [(CUTTING, rapid & (live[earlier:, 0] <= live[earlier:, 1]))]
+    live = cutting.live[earlier:]
+    tried = [(CUTTING, rapid & (live[:, 0] <= live[:, 1]))]
     for part in (SHANK, HOLDER):
-        has = np.any(profiles[:, :, 0] == part, axis=1)[rows[:, CUTTER].astype(int)]
+        has = np.any(cutting.profiles[:, :, 0] == part, axis=1)[rows[:, CUTTER].astype(int)]
         tried.append((part, has & above))
     hits: dict[int, tuple[int, ...]] = {}
     for part, mask in tried:
@@ -303,9 +315,7 @@ def _hits(
         def look(
             at: slice, sweep: Ints = sweep, share: Floats = share, parts: Ints = parts, found: Ints = found
         ) -> None:
-            collisions(
-                stock, profiles, heading, earlier + sweep[at], share[at], parts[at], DEEP, NARROW, found[at]
-            )
+            collisions(stock, cutting, earlier + sweep[at], share[at], parts[at], found[at])
 
         each_block(look, len(sweep), _BLOCK)
         for motion in np.unique(sweeps.motion[sweep[found > 0]]).tolist():
@@ -324,9 +334,15 @@ def _highest_stock(stock: Stock, rows: Floats) -> Floats:
 
 
 def _by_motion(
-    count: int, sweeps: MotionSweeps, sweep: Ints, weight: Floats, found: Floats, laws: Floats,
-    speed: Floats, hits: dict[int, tuple[int, ...]], stock: Stock,
-) -> EngagedMotions:  # fmt: skip
+    count: int,
+    sweeps: MotionSweeps,
+    places: PlacesInStock,
+    laws: Floats,
+    speed: Floats,
+    hits: dict[int, tuple[int, ...]],
+    stock: Stock,
+) -> EngagedMotions:
+    sweep, weight, found = places
     motion = sweeps.motion[sweep]
     touches = found[:, RATE] > LEAST_AREA
     found[~touches, RATE] = 0.0
