@@ -25,6 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from judge.drawn import drawn
 
+import postproc
 from postproc import api
 from postproc.base import batches, geometry, paged_memory
 from postproc.base.findings import Refusal
@@ -52,7 +53,8 @@ def programs(count: int, folder: Path, samples: bool) -> Iterator[tuple[str, Pat
 
 
 def results(program: Path) -> str:
-    """The digest of all files of a run, without the folder in them."""
+    """The digest of all files of a run, without the folders of program and package in them."""
+    places = [str(place).encode() for place in (program.parent, Path(postproc.__file__).parents[1])]
     output, found = program.parent / "same", hashlib.sha256()
     shutil.rmtree(output, ignore_errors=True)
     try:
@@ -60,7 +62,10 @@ def results(program: Path) -> str:
     except Refusal as refusal:
         found.update(str(refusal).encode())
     for path in sorted(output.iterdir()) if output.exists() else ():
-        found.update(path.name.encode() + b"\0" + path.read_bytes().replace(str(output).encode(), b""))
+        content = path.read_bytes()
+        for place in places:
+            content = content.replace(place, b"")
+        found.update(path.name.encode() + b"\0" + content)
     return found.hexdigest()
 
 

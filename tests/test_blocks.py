@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from postproc.base import batches
-from postproc.base.batches import THREADS, blocks, in_blocks, in_spans, spans, taken, threads
+from postproc.base.batches import THREADS, blocks, in_blocks, in_spans, select_rows, spans, threads
 
 
 @pytest.mark.parametrize("count", [0, 1, 9, 10, 11, 95])
@@ -85,7 +85,7 @@ def test_blocks_of_rows_here_and_there_lie_close_together(monkeypatch, span, cho
         rows[part].tolist() for part in parts
     ]
     values = np.random.default_rng(1).random((1000, 2))
-    assert np.array_equal(taken(values, rows), values[rows])
+    assert np.array_equal(select_rows(values, rows), values[rows])
 
 
 def test_rows_of_a_small_program_are_one_block():

@@ -246,7 +246,7 @@ def test_rows_here_and_there_do_not_bring_the_whole_array(small, monkeypatch):
         release()
         with open("/proc/self/statm") as stream:
             before = int(stream.read().split()[2]) * 4096
-        assert np.array_equal(batches.taken(values, rows), rows)
+        assert np.array_equal(batches.select_rows(values, rows), rows)
         assert len(seen) == 16
         assert max(seen) < before + 3 * values.nbytes // 16
         seen.clear()

@@ -87,7 +87,7 @@ def in_spans(work: Callable[[slice], T], chosen: Ints, rows: int = 0) -> Iterato
     return _in_order(work, spans(chosen, rows))
 
 
-def taken(values: Any, chosen: Ints) -> NDArray[Any]:
+def select_rows(values: Any, chosen: Ints) -> NDArray[Any]:
     """``values[chosen]`` (K, ...) of an array (N, ...), or of what gives its rows by their numbers; ``chosen`` (K,)
     ascend and lie here and there."""
     parts = []

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
-from postproc.base.batches import in_spans, taken
+from postproc.base.batches import in_spans, select_rows
 from postproc.base.geometry import Poses, lengths
 from postproc.cell import ForceVectorInterval
 from postproc.compensation.correct import CorrectionResult
@@ -95,7 +95,7 @@ def evaluate_uncertainty(
     that of 2,000.
     """
     rows = select_motions(result)
-    forced = bool(taken(task.wrench, rows).any())
+    forced = bool(select_rows(task.wrench, rows).any())
     force = ForceUncertainty.of(task, rows, force_ci95)
     known = input_uncertainties(task.model, force.largest, forced, vector)
     if force.incomplete:
@@ -142,7 +142,9 @@ def evaluate_uncertainty(
         after=expanded_uncertainty_of_largest(error[sound], moves[sound], known.covariance)
         if sound.any()
         else np.nan,
-        expanded=np.stack([expanded_uncertainty(taken(result.deflection, rows), spread), after], axis=1),
+        expanded=np.stack(
+            [expanded_uncertainty(select_rows(result.deflection, rows), spread), after], axis=1
+        ),
         budget=budget if share.any() else (),
         unstable=int((~sound).sum()),
     )
