@@ -22,9 +22,10 @@ from postproc.diagnosis.candidates import EVERY
 from postproc.diagnosis.decoys import decoys
 from postproc.diagnosis.diagnosis import diagnose
 from postproc.diagnosis.effect_sizes import SURELY, moved, smallest
+from postproc.diagnosis.imitations import MARGIN
 from postproc.diagnosis.residual_patterns import READING, SIDE, pattern_words
 from postproc.diagnosis.selection import CHANCE, selected
-from postproc.diagnosis.verdict import MARGIN, OTHER_COURSE, VERDICTS, Evidence, Named
+from postproc.diagnosis.verdict import OTHER_COURSE, VERDICTS, Evidence, Named
 from postproc.effects import EFFECTS
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import fit

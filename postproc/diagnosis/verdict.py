@@ -11,15 +11,18 @@ from postproc.diagnosis.candidate_fits import has_zeros
 from postproc.diagnosis.candidates import EVERY, Candidate, fewest_parameters, names_of
 from postproc.diagnosis.decoys import HAS_DECOYS
 from postproc.diagnosis.held_out import FOLDS, held_out_gain, regions_of, sessions_of, worst_ratio
+from postproc.diagnosis.imitations import (
+    MARGIN,
+    follows_another_course,
+    is_in_another_course,
+    laws_on_one_joint,
+)
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
 from postproc.diagnosis.search_result import Alternative, Search
 from postproc.diagnosis.selection import (
     Explained,
-    basis_of,
     clipped_squares,
-    counts,
     explained,
-    outside,
     probability,
     scatter,
 )
@@ -29,9 +32,6 @@ from postproc.identification.validation import folds_of
 
 VERDICTS = ("nothing_missing", "named", "partly_named", "ambiguous", "unknown")
 
-
-MARGIN = 10.0
-"""By how much -2 ln(likelihood) of the nearest other explanation must be worse: odds of 150 to 1."""
 
 CLEAR, THERE = 1.5, 1.0
 """Intervals by which a value must be off to be clearly elsewhere, and to be there at all."""
@@ -155,10 +155,12 @@ def judge(search: Search) -> Verdict:
         estimates = _estimates(search.confirmed, candidate, search)
         bounded = all(e.at_bound for e in estimates)
         several = ambiguity_set(search, g, not bounded and _is_observable(candidate, estimates))
-        if _of_another_course(search, candidate, -MARGIN):
+        if follows_another_course(search, candidate, -MARGIN):
             rejected.append((candidate, OTHER_COURSE))
         elif (
-            unexplained and candidate.name not in HAS_DECOYS and _of_another_course(search, candidate, MARGIN)
+            unexplained
+            and candidate.name not in HAS_DECOYS
+            and follows_another_course(search, candidate, MARGIN)
         ):
             rejected.append((candidate, AS_WELL))
         elif not its.is_sufficient:
@@ -183,7 +185,7 @@ def judge(search: Search) -> Verdict:
     # two forms of one effect on one joint do not make its name uncertain
     sets = tuple(a for a in aliases if len({(c.name, c.joint) for c in a}) > 1)
     if unexplained:
-        doubled = _on_one_joint([one.candidate for one in named])
+        doubled = laws_on_one_joint([one.candidate for one in named])
         rejected += [(one.candidate, TWO_LAWS) for one in named if one.candidate in doubled]
         kept = [k for k, one in enumerate(named) if one.candidate not in doubled]
         named, aliases = [named[k] for k in kept], [aliases[k] for k in kept]
@@ -192,7 +194,7 @@ def judge(search: Search) -> Verdict:
     formless = any(why == OTHER_COURSE for _, why in rejected)
     if formless:
         # a zero of the joint that follows another course may be a part of that course
-        kept = [k for k, g in enumerate(groups) if not _in_another_course(search, last, g)]
+        kept = [k for k, g in enumerate(groups) if not is_in_another_course(search, last, g)]
         rejected += [(one.candidate, PART_OF_COURSE) for k, one in enumerate(named) if k not in kept]
         named, aliases = [named[k] for k in kept], [aliases[k] for k in kept]
         groups = [groups[k] for k in kept]
@@ -236,13 +238,6 @@ def judge(search: Search) -> Verdict:
         tuple(rejected),
         patterns,
     )
-
-
-def _on_one_joint(several: Sequence[Candidate]) -> list[Candidate]:
-    """Those that depend on the side of approach and are not alone with that on their joint: two such laws together look
-    like a third."""
-    lost = [c for c in several if c.effect.by_direction]
-    return [c for c in lost if sum(c.joint == other.joint for other in lost) > 1]
 
 
 def _explained_share(variance: float, bare: float, known: bool) -> float:
@@ -353,37 +348,6 @@ def is_implausible(estimates: Sequence[Estimate]) -> bool:
     which a tooth changes sides, say, readings do not determine how wide its gap is."""
     sizes = [(abs(e.value - e.unknown.parameter.null), e.unknown.parameter.scale, e.ci95) for e in estimates]
     return bool(sizes) and all(size > UNUSUAL * scale and wide > 0.5 * size for size, scale, wide in sizes)
-
-
-def _of_another_course(search: Search, candidate: Candidate, limit: float) -> bool:
-    """Whether another course over the same joint or time, one that no effect has, is a lesser explanation by less than
-    ``limit``: below zero a clearly better one."""
-    against = [r for r in search.rivals if r.of == candidate.key and r.is_decoy and r.fitted]
-    return any(r.margin < limit for r in against)
-
-
-def _in_another_course(search: Search, last: Explained, group: int) -> bool:
-    """Whether a chosen ``group`` explains nothing beside the courses without a name that took the places of others on
-    its joint."""
-    linear, given = search.linear, search.linear.problem
-    mine = linear.candidates[group]
-    others = [r for r in search.rivals if r.is_decoy and r.fitted and r.margin < -MARGIN]
-    others = [r for r in others if r.candidate.joint == mine.joint and r.candidate.columns.any()]
-    if not others:
-        return False
-    gone = {r.of for r in others}
-    columns = np.concatenate([linear.weights(np.nan_to_num(r.candidate.columns)) for r in others], axis=1)
-    columns = np.concatenate([columns, np.zeros((linear.priors, columns.shape[1]))])
-    basis = basis_of(outside(linear.basis, columns))
-    beside = replace(
-        given,
-        residual=outside(basis, given.residual[:, None])[:, 0],
-        matrix=outside(basis, given.matrix),
-        rank=given.rank + basis.shape[1],
-    )
-    rest = [g for g in last.groups if g != group and linear.candidates[g].key not in gone]
-    without, with_ = explained(beside, rest), explained(beside, [*rest, group])
-    return not counts(beside, without, with_, len(linear.candidates))
 
 
 def _against(search: Search, mine: Candidate) -> list[Alternative]:

@@ -8,8 +8,9 @@ import numpy as np
 
 from postproc.diagnosis.candidates import EVERY, Candidate
 from postproc.diagnosis.decoys import AlternativeForm
+from postproc.diagnosis.imitations import MARGIN
 from postproc.diagnosis.residual_patterns import goes_with_poses
-from postproc.diagnosis.verdict import MARGIN, Named
+from postproc.diagnosis.verdict import Named
 from postproc.identification.fit import Estimate
 from postproc.report.diagnosed import Diagnosed
 from postproc.report.diagnosed_detection import sentences as detection_limits
