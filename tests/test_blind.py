@@ -155,6 +155,8 @@ STRANGE = [
     case("outside", "leaning_stiffness", 5.0, 30),
     # waves of half an order whose sides of approach are free, a hose, and friction in proportion to load
     *(cases.cases("outside", number + 1, 8200)[number] for number in (13, 18, 26)),
+    # of half an order on one joint, for which waves of all gears pass
+    cases.cases("outside", 6, 8400)[5],
 ]
 HOPELESS = [case("unidentifiable", "balancer_at_one_angle", 2.0, 15, number) for number in (0, 1)]
 

@@ -114,6 +114,17 @@ ELBOWS = {2: program_angles(), 0: np.radians([[5.0 + i, -60.0, -10.0, 10.0, 50.0
 """S -> angles that have it."""
 
 
+@pytest.mark.parametrize("status", ELBOWS)
+def test_where_paths_meet_a_configuration_that_all_have_is_known(status):
+    """That of the number 0 is one like any other."""
+    continues = np.array([True] * 3 + [False] + [True] * 5)
+    kinds = [Kind.LIN, Kind.PTP] + [Kind.LIN] * 7
+    words = {"kind": kinds, "status": status, "continues": continues, "predecessors": {3: (1, 2)}}
+    result = correct(task(ELBOWS[status], **words))
+    assert result.corrected[CARRIES].all()
+    assert "KIN004" not in [one.code for one in result.findings]
+
+
 def crossing(q, words, sign):
     """A PTP with A6 a hair above zero, which the correction takes below (sign 1) or not (-1)."""
     q, model = q.copy(), full()

@@ -57,6 +57,9 @@ ONE_FLOOR = {
 MOST_LINES = 450
 """Lines of a file of the package."""
 
+MOST_PARAMETERS = 8
+"""Parameters of a function that have no default."""
+
 TEXT = {"languages", "base.document"}
 PHYSICS = {"robot", "effects", "process"}
 """Neither side knows of the other; they meet in ``toolpath``."""
@@ -183,6 +186,25 @@ def test_no_file_is_long():
     }
     assert len(lines) > 300
     assert {name: count for name, count in lines.items() if count > MOST_LINES} == {}
+
+
+def required(node: ast.FunctionDef) -> int:
+    """Parameters of a function that have no default."""
+    positional = [arg for arg in (*node.args.posonlyargs, *node.args.args) if arg.arg not in ("self", "cls")]
+    return len(positional) - len(node.args.defaults) + sum(one is None for one in node.args.kw_defaults)
+
+
+def test_no_function_takes_a_train_of_parameters():
+    """What belongs together is a type.  Those with a default are named where they are given; what a command gets from
+    its options is a list of them."""
+    counts = {
+        f"{module}, line {node.lineno}: {node.name}": required(node)
+        for module, tree in modules(ROOT).items()
+        for node in walk(tree)
+        if isinstance(node, ast.FunctionDef) and not module.startswith("postproc.cli.")
+    }
+    assert max(counts.values()) > 4
+    assert {name: count for name, count in counts.items() if count > MOST_PARAMETERS} == {}
 
 
 def test_modules_of_one_name_are_of_one_kind():

@@ -126,6 +126,44 @@ def test_the_start_that_the_cell_states() -> None:
     assert advice == ["state Y, Z under program_start: in the cell, or write them in the first motion"]
 
 
+REFERENCE = {"G28": {"B": 0.0, "C": 90.0}, "G30": {"B": 30.0}}
+
+
+@pytest.mark.parametrize(
+    ("text", "ends"),
+    [
+        ("G28 B0.\nG1 X1. Y1. Z1.\n", ["0 0 0*", "1 1 1"]),
+        ("G91 G28 B0.\nG90 G1 X1. Y1. Z1.\n", ["0 0 0*", "1 1 1"]),
+        ("G91 G28 B0.\nG0 B0.\nG90 G1 X1. Y1. Z1.\n", ["0 0 0*", "0 0 0", "1 1 1"]),
+        # Z goes to the reference point as well, which only rotary axes have in the cell
+        ("G28 Z9. B0.\nG1 X1. Y1.\nZ1.\n", ["?*", "?*", "1 1 1"]),
+        # 90 and 30 deg are no place of the tool without a TCP mode
+        ("G28 C0.\nG1 X1. Y1. Z1.\n", ["0 0 0*", "1 1 1*"]),
+        ("G30 B0.\nG1 X1. Y1. Z1.\n", ["0 0 0*", "1 1 1*"]),
+        ("G28 A0.\nG1 X1. Y1. Z1.\n", ["0 0 0*", "1 1 1*"]),
+        # a further reference point, one that the program stores, an origin that it shifts
+        ("G30 P3 B0.\nG1 X1. Y1. Z1.\n", ["0 0 0*", "1 1 1*"]),
+        ("G28.1 B0.\nG28 B0.\nG1 X1. Y1. Z1.\n", ["0 0 0*", "0 0 0*", "1 1 1*"]),
+        ("G92 B10.\nG28 B0.\nG1 X1. Y1. Z1.\n", ["0 0 0*", "1 1 1*"]),
+        # whether the block runs is not known
+        ("/G28 B0.\nG1 X1. Y1. Z1.\n", ["?*", "1 1 1*"]),
+    ],
+)
+def test_the_reference_point_of_rotary_axes_that_the_cell_states(text: str, ends: list[str]) -> None:
+    assert run("fanuc", text, symbols=REFERENCE) == ends
+
+
+def test_the_tool_that_is_loaded_already_keeps_its_coordinates() -> None:
+    """M6 of LinuxCNC changes no length; of other controls it may lead Z elsewhere."""
+    start = InitialState(tool=1, base=1, words={"X": 0.0, "Y": 0.0, "Z": 7.0})
+    text = "G21 G90 G17 G94 F60\nT1 M6\nG1 X5\nT2 M6\nG1 X6\nT2 M6\nG1 X7\nG1 Z1\nT2 M6\nG1 X8\n"
+    for name, known in (("linuxcnc", [7, np.nan, np.nan, 1, 1]), ("fanuc", [np.nan] * 3 + [1, np.nan])):
+        path = read(name, text.replace("\n", ".\n") if name == "fanuc" else text, "", initial=start).toolpath
+        np.testing.assert_allclose(path.position[:, 2] * 1e3, known)
+    unknown = read("linuxcnc", text, "").toolpath
+    assert np.isnan(unknown.position[0, 2])
+
+
 @pytest.mark.parametrize(
     ("text", "place"),
     [
@@ -159,3 +197,13 @@ def test_blocks_of_one_finding_are_in_the_order_of_the_file():
     program = read("linuxcnc", "O305 SUB\n@15.87\nO305 ENDSUB\nG1 F373.9\n@ 70.63\nM30\n", head="")
     found = next(one for one in program.findings if one.code == "GCO001")
     assert (found.line, found.message.partition("; ")[2]) == (2, "2 blocks, lines 2 to 5")
+
+
+def test_the_advice_for_a_reference_point_that_is_not_stated() -> None:
+    def advice(text: str) -> list[str]:
+        return [finding.help for finding in read("fanuc", text).findings if finding.code == "GCO013"]
+
+    assert advice("G28 B0.\nG1 X1. Y1. Z1.\n") == [
+        "state where G28 leads rotary axes in the cell: symbols: {G28: {B: 0}}"
+    ]
+    assert advice("G28 Z0.\nG1 X1. Y1. Z1. B5.\n") == [""]

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
+from conftest import LINES
 
 from postproc.base.document import Document
+from postproc.base.geometry import abc_from_rotation, rotation_from_abc
+from postproc.base.units import DEG, MM
+from postproc.cell import load_cell
 from postproc.languages.dialect import Program, ReadingSettings
 from postproc.languages.krl import KrlDialect
+from postproc.languages.krl.spatial import product
 from postproc.toolpath.initial_state import UNSTATED, InitialState, Symbol
 
 FULL = "{X 1,Y 2,Z 3,A 4,B 5,C 6}"
@@ -80,6 +87,31 @@ def test_a_program_starts_with_the_state_of_the_cell() -> None:
         ("EXTFCT INT elsewhere(FRAME:IN)\nMINE=BASE_DATA[2]\nelsewhere(MINE)\n$BASE=MINE\n", "base [2]"),
         ("MINE=BASE_DATA[2]\nelsewhere(MINE.X+1)\n$BASE=MINE\n", "base [2]"),
         ("MINE=BASE_DATA[2]\nLIN MINE\n$BASE=MINE\n", "base [2]"),
+        # frames that are stated in an entry
+        ("$BASE=BASE_DATA[2]:{X 7,Y 0,Z 1,A 0,B 0,C 0}\n", "base [2]{7 0 1 0 0 0}"),
+        (
+            "$BASE=BASE_DATA[2]:{X 1,Y 0,Z 0,A 90,B 0,C 0}:{X 7,Y 0,Z 0,A 0,B 0,C 0}\n",
+            "base [2]{1 7 0 90 0 0}",
+        ),
+        ("n=1\nMINE={X 7,Y 0,Z 0,A 0,B 0,C 0}\n$BASE=BASE_DATA[n+1]:MINE\n", "base [2]{7 0 0 0 0 0}"),
+        ("MINE=BASE_DATA[2]:{X 7,Y 0,Z 0,A 0,B 0,C 0}\n$BASE=MINE\n", "base [2]{7 0 0 0 0 0}"),
+        ("BASE_DATA[3]=BASE_DATA[2]:{X 7,Y 0,Z 0,A 0,B 0,C 0}\nBAS(#BASE,3)\n", "base [2]{7 0 0 0 0 0}"),
+        ("BASE_DATA[3]=BASE_DATA[2]\nBAS(#BASE,3)\n", "base [2]"),
+        ("BAS(#BASE,2)\n$BASE=$BASE:{X 7,Y 0,Z 0,A 0,B 0,C 0}\n", "base [2]{7 0 0 0 0 0}"),
+        ("MINE=INV_POS({X 7,Y 0,Z 0,A 90,B 0,C 0})\n$BASE=BASE_DATA[2]:MINE\n", "base [2]{0 7 0 -90 0 0}"),
+        ("$BASE=BASE_DATA[2]:{X 0,Y 0,Z 0,A 0,B 0,C 0}\n", "base [2]"),
+        ("$BASE={X 7,Y 0,Z 0,A 0,B 0,C 0}:BASE_DATA[2]\n", "base ?"),
+        ("$BASE=BASE_DATA[2]:BASE_DATA[3]\n", "base ?"),
+        ("$BASE=TOOL_DATA[2]:{X 7,Y 0,Z 0,A 0,B 0,C 0}\n", "base ?"),
+        ("$BASE=INV_POS(BASE_DATA[2])\n", "base ?"),
+        ("BASE_DATA[2].X=5\n$BASE=BASE_DATA[2]:{X 7,Y 0,Z 0,A 0,B 0,C 0}\n", "base ?"),
+        ("$BASE=BASE_DATA[2]:{X 7,Y 0,Z 0,A 0,B 0,C 0}\n$BASE.X=3\n", "base ?"),
+        ("MINE=BASE_DATA[2]:{X 7,Y 0,Z 0,A 0,B 0,C 0}\n$BASE=MINE.X\n", "base ?"),
+        ("IF BASE_DATA[2]==BASE_DATA[2] THEN\n$BASE=$NULLFRAME\nELSE\nBAS(#BASE,2)\nENDIF\n", "base ?"),
+        (
+            "IF $IN[1] THEN\nMINE=BASE_DATA[2]\nELSE\nMINE=BASE_DATA[2]:{X 7,Y 0,Z 0,A 0,B 0,C 0}\nENDIF\n$BASE=MINE\n",
+            "base ?",
+        ),
     ],
 )
 def test_a_copy_of_a_numbered_frame_is_that_frame(text: str, frames: str) -> None:
@@ -92,3 +124,46 @@ def test_a_point_that_varies_names_the_lines_that_set_it() -> None:
     program = read(text + "LIN {X 9,Y 2,Z 3,A 0,B 0,C 0}\nENDIF\nLIN {Y 5,Z 3,A 0,B 0,C 0}\n")
     (refused,) = program.toolpath.constraints.refused.values()
     assert refused.message == "the point omits X, and the position is not known: it varies: line 5 or line 7"
+
+
+@pytest.mark.parametrize(
+    ("line", "table", "literal"),
+    [
+        ("$BASE=BASE_DATA[1]", "bases", "{X 20,Y -30,Z 5,A 25,B 3,C -2}"),
+        ("$TOOL=TOOL_DATA[1]", "tools", "{X 3,Y -4,Z 12,A 15,B 6,C -7}"),
+    ],
+)
+def test_a_frame_in_an_entry_is_corrected_as_the_product_of_both(compensate, job, line, table, literal):
+    """The same program with the numbers of the product, once by the cell's tables, and once by the text alone."""
+    at = LINES.index(line)
+    job.write([*LINES[:at], f"{line}:{literal}", *LINES[at + 1 :]])
+    done = compensate(job.program, "--force")
+    assert done.code in (0, 3), done.err
+    written = job.output.read_bytes().splitlines()
+    assert written[at + 1] == f"{line}:{literal}".encode()
+    cell = load_cell(job.folder / "cell.yaml")
+    pose = cell.bases[1] if table == "bases" else cell.tools[1].pose
+    angles = abc_from_rotation(pose.rotation)
+    entry = np.concatenate([pose.position / MM, angles / DEG]).tolist()
+    within = [float(part.split()[1]) for part in literal.strip("{}").split(",")]
+    numbers = product(tuple(entry), tuple(within))
+    stated = ",".join(f"{key} {value:.9f}" for key, value in zip("XYZABC", numbers, strict=True))
+    other = job.folder / "other"
+    other.mkdir()
+    cell_text = (job.folder / "cell.yaml").read_text()
+    if table == "tools":  # the spindle's axis of the literal tool
+        axis = rotation_from_abc(np.array(within[3:]) * DEG).T @ cell.tools[1].axis
+        place = ", ".join(f"{key.lower()}: {value:.9f}" for key, value in zip("XYZABC", numbers, strict=True))
+        cell_text = cell_text.replace("tools:\n", f"tools:\n  2: {{{place}, axis: {axis.tolist()}}}\n")
+    (other / "cell.yaml").write_text(cell_text)
+    program = other / "part.src"
+    program.write_text(
+        "\n".join([*LINES[:at], f"{line.partition('=')[0]}={{{stated}}}", *LINES[at + 1 :], ""])
+    )
+    assert compensate(program, "--force").code == done.code
+    others = (other / "compensated" / "part.src").read_bytes().splitlines()
+    assert len(written) == len(others)
+    for one, two in zip(written, others, strict=True):
+        if one.startswith(b"LIN"):
+            pairs = (re.findall(rb"-?\d+\.\d+", each) for each in (one, two))
+            np.testing.assert_allclose(*[np.array(each, float) for each in pairs], atol=0.0021)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import JUMPED_LINES
+from path_cases import corner
 from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation, Slerp
 
 from postproc.base.geometry import Poses
 from postproc.compensation.correct import correct
-from postproc.compensation.path_error import SHARES, path_errors
+from postproc.compensation.path_error import ON_RAMPS, SHARES, path_errors, path_errors_at, programmed
+from postproc.compensation.ramped_forces import add_force_ramps
 from postproc.compensation.subdivide import subdivide
 from postproc.compensation.subdivision import Limits, subdivided_motions
 from postproc.robot.inverse import inverse
@@ -51,6 +55,32 @@ def left_between(task, result):
         task, subdivided_motions(task, subdivide(task, result, Limits(no_insert=True)), rows)
     )
     return found
+
+
+def test_a_motion_as_programmed_is_the_whole_of_its_path(corrected):
+    task, result = corrected
+    rows = np.flatnonzero(result.corrected)
+    segments = programmed(task, rows)
+    assert (segments.first == 0.0).all()
+    assert (segments.last == 1.0).all()
+    np.testing.assert_array_equal(segments.end.position, task.wanted[rows].position)
+
+
+@pytest.mark.parametrize("length", [2e-3, 5e-3])
+def test_where_a_force_goes_over_the_path_is_looked_at_closely(length):
+    """The error of a motion with a ramp is the largest of those at all places."""
+    task = corner()
+    steps = np.array([False, False, True, True, False])
+    task = add_force_ramps(replace(task, force=replace(task.force, steps=steps)), length)
+    rows = np.array([3, 4])
+    segments = programmed(task, rows)
+    found, _ = path_errors(task, segments)
+    each = {share: path_errors_at(task, segments, np.full(2, share))[0] for share in (*SHARES, *ON_RAMPS)}
+    largest = np.max(list(each.values()), axis=0)
+    ramped = np.isin(rows, task.force.ramps.row)
+    np.testing.assert_array_equal(found[ramped], largest[ramped])
+    closely = np.max([each[share] for share in ON_RAMPS], axis=0)
+    assert (closely > np.max([each[share] for share in SHARES], axis=0))[ramped].any()
 
 
 def test_between_is_where_the_controller_passes(corrected):

@@ -8,11 +8,13 @@ import pytest
 from test_forces import DOWN, FRAMES, cell_of, codes, path_of, refused, run
 from test_milling import ALLOY, MM, cut_of
 
-from postproc.base.geometry import rotation_from_abc
+from postproc.base.geometry import Poses, rotation_from_abc
 from postproc.process.milling_forces import Coefficients, mean_force
+from postproc.process.operation_names import name_operations
 from postproc.process.operations import join
 from postproc.process.process_file import read_process
 from postproc.toolpath import Annotation, FrameRef, Kind
+from postproc.workflows.cell_tool_errors import tool_numbers
 
 OPERATION = """
   - {by}
@@ -152,6 +154,16 @@ def test_a_name_ends_with_the_tool(tmp_path):
     assert join(read, path).tolist() == [-1, 0, 0, 0, 1, 1, 1]
     back = program([(1, "FACE")], tool=[1, 1, 1, 1, 2, 1, 1], frames=(*FRAMES, FrameRef(7, None, 5)))
     assert join(read, back).tolist() == [-1, 0, 0, 0, 1, -1, -1]
+
+
+def test_a_tool_frame_in_an_entry_is_the_tool_of_that_entry(tmp_path):
+    """$TOOL=TOOL_DATA[7]:{...}: another point of the same tool, which cuts what tool 7 cuts."""
+    read = read_process(process(tmp_path, "operations:" + OPERATION.format(by="tool: 7")))
+    frame = FrameRef(None, None, 5, in_entry=(7, Poses.identity()))
+    path = program([], tool=[1, 1, 1, 1, 2, 2, 2], frames=(*FRAMES, frame))
+    assert join(read, path).tolist() == [-1, -1, -1, -1, 0, 0, 0]
+    assert tool_numbers(path).tolist() == [1, 1, 1, 1, 7, 7, 7]
+    assert name_operations(path).names == ("tool 1", "tool 7")
 
 
 def test_a_cut_behind_a_comment_without_a_name_is_told(tmp_path):

@@ -87,8 +87,10 @@ def _pose(frame: FrameRef, numbered: dict[int, Poses]) -> Poses:
         return frame.pose
     if frame.number == 0:  # $NULLFRAME
         return Poses.identity()
-    found = None if frame.number is None else numbered.get(frame.number, frame.declared)
-    return UNKNOWN if found is None else found
+    found = None if frame.entry is None else numbered.get(frame.entry, frame.declared)
+    if found is None:
+        return UNKNOWN
+    return found if frame.in_entry is None else found @ frame.in_entry[1]
 
 
 def _spindle(frame: FrameRef, cell: Cell) -> Floats:
@@ -97,6 +99,9 @@ def _spindle(frame: FrameRef, cell: Cell) -> Floats:
     if frame.number is not None:
         tool = cell.tools.get(frame.number)
         return unknown if tool is None else tool.axis
+    if frame.in_entry is not None:
+        number, within = frame.in_entry
+        return within.rotation.T @ cell.tools[number].axis if number in cell.tools else unknown
     if frame.pose is None:
         return unknown
     axes = [tool.axis for tool in cell.tools.values() if _same(tool.pose, frame.pose)]
@@ -117,7 +122,7 @@ def _missing(
     findings: dict[int, Finding] = {}
     for index in np.unique(used):
         frame = toolpath.frames[index]
-        number = frame.number
+        number = frame.entry
         if (
             frame.pose is not None
             or frame.declared is not None

@@ -8,13 +8,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from postproc.base.arrays import Bools, Ints
-from postproc.base.findings import Finding, resembles
+from postproc.base.findings import Finding
 from postproc.toolpath import Toolpath
+from postproc.toolpath.meant_comments import meant_as_switch
 
 _SWITCH = re.compile(r"COMPENSATE\s+(ON|OFF)(?![A-Z0-9_])", re.IGNORECASE)
-
-
-_MEANT = re.compile(r"([A-Z]{8,14})[\s:=_]*(?:ON|OFF?)\s*\Z", re.IGNORECASE)
 
 
 def number_cuts(in_scope: Bools, continues: Bools | None = None) -> Ints:
@@ -46,7 +44,7 @@ def switch_findings(file: str, toolpath: Toolpath) -> list[Finding]:
     """The comments that start with COMPENSATE, or a misspelling of it, and switch nothing."""
     notes = [
         *(note for note in toolpath.annotations if note.text.strip().upper().startswith("COMPENSATE")),
-        *(note for note in toolpath.comments if _is_meant(note.text)),
+        *(note for note in toolpath.comments if meant_as_switch(note.text)),
     ]
     return [
         Finding(
@@ -58,11 +56,6 @@ def switch_findings(file: str, toolpath: Toolpath) -> list[Finding]:
         for note in notes
         if not _SWITCH.match(note.text.strip())
     ]
-
-
-def _is_meant(text: str) -> bool:
-    found = _MEANT.match(text.strip())
-    return found is not None and resembles(found[1], "COMPENSATE")
 
 
 def uncorrected_findings(

@@ -106,14 +106,16 @@ class DriftingBase(AlternativeForm, Offset):
 def decoys(model: StiffnessModel, q: Floats, mine: Candidate) -> list[Candidate]:
     """What ``mine`` has to be distinguished from, in a ``model`` measured at ``q`` (R, n); started at the null.
 
-    Waves of all gears at once have none: each gear may have other orders beside, and what holds on poses that were left
-    out (on a real UR5 0.089 instead of 0.100 mm) is not taken away by that.
+    Waves of all gears at once have those of one joint: each gear may have other orders beside, and what holds on poses
+    that were left out (on a real UR5 0.089 instead of 0.100 mm) is not taken away by that; but what one course over one
+    joint explains as well is no wave of all gears.
     """
-    if mine.joint == EVERY:
-        return []
     joints = model.robot.joints
     if mine.name == TransmissionError.name:
-        return [_decoy(model, q, OtherWave(joints, (order,)), mine.joint) for order in ORDERS]
+        places = [one.name for one in joints] if mine.joint == EVERY else [mine.joint]
+        return [_decoy(model, q, OtherWave(joints, (order,)), place) for place in places for order in ORDERS]
+    if mine.joint == EVERY:
+        return []
     if mine.name == ThermalGrowth.name:
         return [_decoy(model, q, DriftingBase(joints, str(mine.effect.described()["variable"])), "")]
     if mine.name not in HAS_DECOYS:

@@ -124,11 +124,12 @@ def _check_frames(path: Toolpath, back: Toolpath, file: str) -> None:
 
 
 def _same_frame(one: FrameRef, other: FrameRef) -> bool:
-    if one.number != other.number or (one.pose is None) != (other.pose is None):
+    if (one.number, one.entry) != (other.number, other.entry):
         return False
-    if one.pose is None or other.pose is None:
-        return True
-    pairs = (one.pose.position, other.pose.position), (one.pose.rotation, other.pose.rotation)
+    poses = [frame.pose if frame.in_entry is None else frame.in_entry[1] for frame in (one, other)]
+    if poses[0] is None or poses[1] is None:
+        return poses[0] is poses[1]
+    pairs = (poses[0].position, poses[1].position), (poses[0].rotation, poses[1].rotation)
     return all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
 
 

@@ -12,24 +12,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from postproc.base.arrays import Bools, Ints
-from postproc.base.findings import Finding, Refusal, resembles
+from postproc.base.findings import Finding, Refusal
 from postproc.process.stated_forces import BASE, NotAForce, StatedForces, is_number_like, parse_force
 from postproc.process.wrenches import is_air
 from postproc.toolpath import Annotation, Toolpath
+from postproc.toolpath.meant_comments import meant_as_force
 
 FORM = "write FORCE fx fy fz [mx my mz] [@base|world|tool|feed] in N and N m, or FORCE OFF"
 _FORCE = re.compile(r"force", re.IGNORECASE)
 _REST = re.compile(r"force(?=[\s,@]|\Z)[\s,]*", re.IGNORECASE)
 
 _OFF = ((0.0,) * 6, BASE)
-
-_VALUE = r"[-+]?\d[\d.]*+"
-_LETTER = r"[FM]?[XYZ]\s*+(?:[:=]\s*+)?"
-_MEANT = re.compile(
-    rf"([A-Za-z]{{4,7}})[\s:=,_]*+(?:(O\w{{1,3}}|0FF)\s*+\Z|(?:{_LETTER})?{_VALUE}(?:[\s,;]++(?:{_LETTER})?{_VALUE}){{2}})",
-    re.IGNORECASE,
-)
-"""A word, and OFF or three numbers with or without letters: what a force comment states, misspelt or not."""
 
 
 def read_annotations(
@@ -52,7 +45,7 @@ def read_annotations(
             message = f"{annotation.text.strip()[:60]!r}: {error}"
             wrong.append(Finding("FRC002", message, file, annotation.line, help=FORM))
             continue
-        if force is None and _is_meant(annotation.text):
+        if force is None and meant_as_force(annotation.text):
             wrong.append(_misspelt(annotation, file))
             continue
         if force is None:
@@ -61,7 +54,7 @@ def read_annotations(
             continue
         rows.append(annotation.row)
         forces.append(force)
-    wrong += [_misspelt(comment, file) for comment in toolpath.comments if _is_meant(comment.text)]
+    wrong += [_misspelt(comment, file) for comment in toolpath.comments if meant_as_force(comment.text)]
     if wrong:
         raise Refusal(*wrong)
     if not rows:
@@ -70,14 +63,6 @@ def read_annotations(
     frames = np.array([_OFF[1], *(frame for _, frame in forces)])
     stated = StatedForces(values, frames, latest(rows, len(toolpath)))
     return stated, (*ignored, *([] if rapids else _jumps(stated, toolpath, file)))
-
-
-def _is_meant(text: str) -> bool:
-    """Whether a comment that states no force was meant to: FORCE misspelt, or with other signs before its numbers."""
-    found = _MEANT.match(text.strip())
-    if found is None or not resembles(found[1], "FORCE"):
-        return False
-    return found[2] is None or resembles(found[2].replace("0", "O"), "OFF")
 
 
 def _misspelt(comment: Annotation, file: str) -> Finding:

@@ -28,7 +28,7 @@ def name_operations(toolpath: Toolpath, operations: Sequence[Operation] = ()) ->
     """By the process file's ``operations`` where they have a motion, else by the comments ``OPERATION ...`` of the
     program, else by the number of the tool."""
     count = len(toolpath)
-    numbers = np.array([frame.number or 0 for frame in toolpath.frames] + [0])[toolpath.tool]
+    numbers = np.array([frame.entry or 0 for frame in toolpath.frames] + [0])[toolpath.tool]
     labels = np.array([f"tool {number}" for number in numbers.tolist()], dtype=object)
     places = []
     for comment in sorted(toolpath.comments, key=lambda one: (one.row, one.line)):

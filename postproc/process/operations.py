@@ -93,7 +93,7 @@ def join(operations: Sequence[Operation], toolpath: Toolpath) -> Ints:
     """
     n = len(toolpath)
     owner = np.full(n, -1)
-    numbers = np.array([frame.number or 0 for frame in toolpath.frames] + [0])
+    numbers = np.array([frame.entry or 0 for frame in toolpath.frames] + [0])
     tool = numbers[toolpath.tool]
     for index, operation in enumerate(operations):
         if operation.tool:
@@ -240,7 +240,7 @@ def _offers(operation: Operation, toolpath: Toolpath) -> str:
             else "the program has no comments that could match a name"
         )
     if operation.tool:
-        used = {toolpath.frames[index].number for index in np.unique(toolpath.tool) if index >= 0}
+        used = {toolpath.frames[index].entry for index in np.unique(toolpath.tool) if index >= 0}
         numbers = ", ".join(str(number) for number in sorted(n for n in used if n))
         if numbers:
             return f"the program uses the tools {numbers}"

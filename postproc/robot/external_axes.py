@@ -119,7 +119,7 @@ class External:
             joint = own, robot.external, joint_unit(robot)
         holders = [axis for axis in axes if axis.bases]
         carriers = {base: i for i, axis in enumerate(holders) for base in axis.bases}
-        of_frame = np.array([*(carriers.get(frame.number or 0, -1) for frame in path.frames), -1], np.int8)
+        of_frame = np.array([*(carriers.get(frame.entry or 0, -1) for frame in path.frames), -1], np.int8)
         external = External(
             path,
             joint,
@@ -139,7 +139,7 @@ class External:
         """By how much a base is elsewhere in the robot base than with all external axes at zero, where none moves."""
         if self.constant is None:
             return Poses.identity()
-        return self.constant[1 + self.carriers.get(frame.number or 0, -1)]
+        return self.constant[1 + self.carriers.get(frame.entry or 0, -1)]
 
     @cached_property
     def turns_part(self) -> Bools:

@@ -34,12 +34,20 @@ class FrameRef:
     a tool); None where only the controller knows it, that is entry ``number`` of BASE_DATA / TOOL_DATA.
     ``line`` is where it was set, for messages.  ``declared``: what the controller's own file states of a frame whose
     ``pose`` the program does not state; the cell's base or tool of that number comes first.
+    ``in_entry``: (number, pose) of a frame that the program states in such an entry (``BASE_DATA[2]:{X 10 ...}``):
+    ``number`` and ``pose`` are None then, and ``declared`` is that of the entry.
     """
 
     number: int | None
     pose: Poses | None
     line: int = 0
     declared: Poses | None = None
+    in_entry: tuple[int, Poses] | None = None
+
+    @property
+    def entry(self) -> int | None:
+        """The number of the entry that it is, or in which it is stated; None without one."""
+        return self.number if self.in_entry is None else self.in_entry[0]
 
 
 @dataclass(frozen=True)

@@ -291,11 +291,13 @@ class Toolpath(MotionColumns):
         if index < 0:
             return "?"
         frame = self.frames[index]
-        if frame.pose is None:
-            return f"[{frame.number}]"
-        angles = abc_from_rotation(frame.pose.rotation) / DEG
-        numbers = [*(frame.pose.position / MM), *angles]
-        return "{" + " ".join(_number(value) for value in numbers) + "}"
+        pose = frame.pose if frame.in_entry is None else frame.in_entry[1]
+        entry = "" if frame.pose is not None else f"[{frame.entry}]"
+        if pose is None:
+            return entry
+        angles = abc_from_rotation(pose.rotation) / DEG
+        numbers = [*(pose.position / MM), *angles]
+        return f"{entry}{{{' '.join(_number(value) for value in numbers)}}}"
 
 
 def external_at(path: Toolpath, rows: Ints, share: Floats | None = None) -> Floats:

@@ -22,7 +22,7 @@ SHOWN = 4
 
 def tool_numbers(path: Toolpath) -> Ints:
     """(N,) number of the tool of each motion, 0 without."""
-    return np.array([frame.number or 0 for frame in path.frames] + [0])[path.tool]
+    return np.array([frame.entry or 0 for frame in path.frames] + [0])[path.tool]
 
 
 def tool_displacement(

@@ -341,7 +341,7 @@ def _conditions(
     if weighs:
         mass, com = mass.copy(), com.copy()
         for row, frame in enumerate(path.frames):
-            tool = cell.tools.get(frame.number or 0)
+            tool = cell.tools.get(frame.entry or 0)
             if tool is not None and tool.mass is not None and tool.com is not None:
                 mass[path.tool == row], com[path.tool == row] = tool.mass, tool.com
     return Conditions(

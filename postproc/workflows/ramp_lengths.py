@@ -31,7 +31,7 @@ def ramp_lengths(cell: Cell, path: Toolpath, force: Wrenches) -> Floats:
         return np.maximum(nearest_point(cell), 1e-3 * cell.cycle_ms * np.nan_to_num(path.feed))
     radius = np.full(len(path.frames) + 1, np.nan)  # the last is for an unknown tool
     for index, frame in enumerate(path.frames):
-        tool = cell.tools.get(frame.number or 0)
+        tool = cell.tools.get(frame.entry or 0)
         if tool is not None and tool.diameter is not None:
             radius[index] = 0.5 * tool.diameter
     if force.radius is None and np.isnan(radius).all():

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from postproc.base.document import Document
+from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
 from postproc.languages import DIALECTS
 from postproc.languages.dialect import ReadingSettings
@@ -121,9 +122,15 @@ def _frame(frames: tuple[FrameRef, ...], index: int, table: dict[int, Six]) -> n
     frame = frames[index]
     if frame.pose is None:
         if frame.declared is None:
-            stated = table.get(frame.number)
-            return None if stated is None else matrix(dict(zip(FRAME, stated, strict=True)))
-        frame = replace(frame, pose=frame.declared)
+            stated = table.get(frame.entry)
+            entry = None if stated is None else matrix(dict(zip(FRAME, stated, strict=True)))
+        else:
+            entry = _homogeneous(frame.declared)
+        return entry if entry is None or frame.in_entry is None else entry @ _homogeneous(frame.in_entry[1])
+    return _homogeneous(frame.pose)
+
+
+def _homogeneous(pose: Poses) -> np.ndarray:
     out = np.eye(4)
-    out[:3, :3], out[:3, 3] = frame.pose.rotation, frame.pose.position / MM
+    out[:3, :3], out[:3, 3] = pose.rotation, pose.position / MM
     return out

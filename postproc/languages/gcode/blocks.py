@@ -300,12 +300,19 @@ CYCLES = (73.0, *(float(code) for code in range(81, 90)))
 
 
 def frame_events(
-    words: BlockWords, spoiled: Bools, away: Bools, ends: Floats, lengths: Bools, reasons: Reasons
+    words: BlockWords,
+    spoiled: Bools,
+    away: Bools,
+    ends: Floats,
+    lengths: Bools,
+    references: Floats,
+    reasons: Reasons,
 ) -> AxisWords:
     """What the blocks do to the coordinates; why they leave them unknown is put into ``reasons``.
 
     spoiled (B,): blocks before which the base became another one; away (B,): see ``tilted``; ends (B,) [m]: as of
-    ``CycleEnds``; lengths (B,): blocks in which another tool length holds than before.
+    ``CycleEnds``; lengths (B,): blocks in which another tool length holds than before; references (B, 6) [rad]: as of
+    ``reference_angles``.
     """
     modal, n = words.modal, len(words)
     force, flow = modal.force, modal.flow
@@ -335,7 +342,9 @@ def frame_events(
     ambiguous = target & (force[Group.DISTANCE] < 0)[:, None]
     lose(ambiguous, np.any(ambiguous, axis=1), What.MODE)
     home, other = words.motion & modal.has(Once.HOME), np.isin(move, (Move.OTHER,)) & words.motion
-    lose(present | ~np.any(present, axis=1)[:, None], home, What.REFERENCE)
+    led = np.isfinite(references) & home[:, None]
+    target, value, relative = target | led, np.where(led, references, value), relative & ~led
+    lose((present | ~np.any(present, axis=1)[:, None]) & ~led, home, What.REFERENCE)
     lose(present, words.motion & modal.has(Once.MACHINE), What.MACHINE)
     lose(whole, words.motion & modal.has(Once.PROBE), What.PROBE)
     lose(whole, words.axis & modal.unknown, What.CODE)

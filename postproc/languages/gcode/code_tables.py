@@ -135,6 +135,7 @@ LINUXCNC = Control(
     radius_gap=(0.02e-3 * math.sqrt(2), 0.002 * 25.4e-3 * math.sqrt(2)),
     drills=_DRILLS,
     states_tool=61,
+    keeps_length=True,
 )
 """LinuxCNC, and ISO code that is of no other control."""
 

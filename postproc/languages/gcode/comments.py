@@ -14,6 +14,7 @@ from postproc.languages.core.row_facts import SPEAKS
 from postproc.languages.dialect import MARK
 from postproc.languages.gcode.source import Source
 from postproc.toolpath import Annotation
+from postproc.toolpath.meant_comments import meant_to_speak
 
 _HEAD = re.compile(
     rb"[ \t]*+(?:%[^\r\n]*+|;[ \t]*+\$PATH[ \t]*+=[^\r\n]*+"
@@ -53,7 +54,7 @@ def remarks(
             continue
         if SPEAKS.match(said):
             speaking.append(Annotation(row, said, number))
-        elif own and said:
+        elif said and (own or meant_to_speak(said)):
             others.append(Annotation(row, said, number))
     at = head(raw)
     return Remarks(tuple(speaking), tuple(others), marker, Span(0, at, at))

@@ -198,7 +198,8 @@ class Control:
     word belongs to a code of its block or to its motion; expressions: the language of its variables and
     expressions, None where these are not read; radius_gap [m]: by how much the radii of an arc at its start and end may
     differ where mm and where inch are in force; drills: codes of the cycles that go to R, to the depth that the axis
-    normal to the plane states, and back.  states_tool: the M code whose Q is the number of the tool that is loaded.
+    normal to the plane states, and back.  states_tool: the M code whose Q is the number of the tool that is loaded;
+    keeps_length: M6 with the tool that is loaded already changes no coordinate.
     """
 
     name: str
@@ -231,3 +232,4 @@ class Control:
     radius_gap: tuple[float, float] = (1e-5, 1e-5)
     drills: frozenset[int] = frozenset()
     states_tool: int | None = None
+    keeps_length: bool = False

@@ -168,12 +168,13 @@ def check_correctability(
         "GCO012",
         "it is not known whether I J K are coordinates or differences",
     )
-    refuse(
-        moves.tool_orientation.wrong == 1,
-        "GCO013",
-        "a rotary axis is not at 0, or not known, and no TCP mode is active",
-    )
-    refuse(moves.tool_orientation.wrong == 2, "GCO013", "a rotary axis that the program uses is not set yet")
+    led = (modal.has(Once.HOME) & (words.has(*AXES[3:]) | ~words.axis)).any() and words.control.iso
+    reference = "state where G28 leads rotary axes in the cell: symbols: {G28: {B: 0}}" if led else ""
+    for wrong, message in (
+        (1, "a rotary axis is not at 0, or not known, and no TCP mode is active"),
+        (2, "a rotary axis that the program uses is not set yet"),
+    ):
+        refuse(moves.tool_orientation.wrong == wrong, "GCO013", message, reference)
 
 
 def _is_arc(move: Ints) -> Bools:

@@ -43,13 +43,12 @@ class GcodeMotions:
         move: Ints,
         kind: Ints,
         plane: Ints,
-        start: Floats,
-        end: Floats,
         where: Positions,
         arcs: ArcGeometry,
         orientation: ToolOrientation,
     ) -> GcodeMotions:
-        """Of ``block``, ``move``, ``kind``, ``plane`` (N,), ``start`` and ``end`` (N, 6) [m, rad] as of the class."""
+        """Of ``block``, ``move``, ``kind``, ``plane`` (N,) as of the class."""
+        start, end = where.start[block], where.end[block]
         turn = np.array([frame.turn for frame in where.frames])[where.frame[block]]
         shift = np.array([frame.shift[:3] for frame in where.frames])[where.frame[block]]
         centre = (turn @ arcs.centre[..., None])[..., 0] + shift

@@ -308,7 +308,10 @@ def tool_lengths(words: BlockWords, tool: Ints) -> ToolLengths:
     else:
         off = everywhere(False, n)
     m = words.words(key("M"))
-    changes[m.block[m.value == TOOL_CHANGE]] = True
+    at = m.block[m.value == TOOL_CHANGE]
+    if words.control.keeps_length:
+        at = at[tool[at] < 0]
+    changes[at] = True
     changes |= switched(tool, int(tool[0]) if n else -1)
     if words.control.offsets is not None:
         edge = words.words(words.control.offsets)

@@ -60,6 +60,7 @@ from postproc.languages.gcode.motions import GcodeMotions
 from postproc.languages.gcode.numbered import WorkOffsets, references, tool_lengths, tools, work_offsets
 from postproc.languages.gcode.orientation_words import OrientationWords
 from postproc.languages.gcode.positions import Positions, Trace
+from postproc.languages.gcode.reference_points import reference_angles
 from postproc.languages.gcode.refusals import RefusalCollector
 from postproc.languages.gcode.source_map import STATE, FoldedNumbers, GcodeSourceMap
 from postproc.languages.gcode.subprogram_files import JoinedText, file_name, join
@@ -272,6 +273,7 @@ def _followed(
     allowed = blend_tolerances(words)
     lengths = tool_lengths(words, tool)
     ends = cycle_ends(words, events, lengths.changes | offset.changed)
+    references_reached = reference_angles(words, settings.symbols)
     drills = drill_cycles(words, events, offset.changed, lengths.changes)
     found, differing = FilledRows(len(rows)), 0
     for start in range(0, max(len(words), 1), PART):
@@ -284,6 +286,7 @@ def _followed(
             away[start:stop],
             ends.level[start:stop],
             lengths.changes[start:stop],
+            references_reached[start:stop],
             reasons,
         )
         where = trace.follow(way, start)
@@ -377,7 +380,7 @@ def _motions(
     kind[force[Group.AXIAL][rows] != 0] = Kind.PTP
     kind[words.modal.unknown[rows]] = Kind.OTHER
     pose = tool_orientations.of(trace, where, rows, words.start, kind == Kind.PTP)
-    moves = GcodeMotions.of(rows, move, kind, plane, start, end, where, desired_path, pose)
+    moves = GcodeMotions.of(rows, move, kind, plane, where, desired_path, pose)
     return with_holes(moves, holes, where)
 
 

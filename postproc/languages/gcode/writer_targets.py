@@ -68,20 +68,25 @@ def follow(motions: Wanted, start: Floats, a: int, b: int, into: Followed) -> No
         _follow_column(motions, float(start[column]), a, b, column, into)
 
 
+def _half_steps(decimals: Ints) -> Floats:
+    """(M,) half of the last digit of numbers with so many ``decimals`` (M,)."""
+    return np.asarray(0.5 * 10.0**-decimals + SLACK, dtype=np.float64)
+
+
 def _follow_column(motions: Wanted, start: float, a: int, b: int, column: int, into: Followed) -> None:
     want, own = motions.wanted[a:b, column], motions.own[a:b, column]
     decimals = motions.decimals[a:b, column]
     closed, known = motions.closed[a:b, column], np.isfinite(want)
-    half = np.asarray(0.5 * 10.0**-decimals + SLACK, dtype=np.float64)
+    half = _half_steps(decimals)
     alone = np.isfinite(own) & ~motions.relative[a:b, column] & ~motions.fixed[a:b] & ~closed
     with np.errstate(invalid="ignore"):
         write = alone & known & ~(np.abs(want - own) <= half)
     number = np.where(write, _rounded(want, decimals), own)
     end = np.where(alone, number, want)
     led = np.flatnonzero(~alone & (~motions.fixed[a:b] | np.isnan(own)) & known)
-    if len(led):
-        _follow_led(motions, start, a, b, column, led, half, write, number, end)
     into.end[a:b, column], into.write[a:b, column], into.number[a:b, column] = end, write, number
+    if len(led):
+        _follow_led(motions, start, a, b, column, led, into)
     _begun(motions, start, a, b, slice(column, column + 1), into)
 
 
@@ -93,24 +98,20 @@ def _begun(motions: Wanted, start: Floats | float, a: int, b: int, columns: slic
 
 
 def _follow_led(
-    motions: Wanted,
-    start: float,
-    a: int,
-    b: int,
-    column: int,
-    led: Ints,
-    half: Floats,
-    write: Bools,
-    number: Floats,
-    end: Floats,
+    motions: Wanted, start: float, a: int, b: int, column: int, led: Ints, into: Followed
 ) -> None:
-    """What depends on where the motion before ended: absent words, increments, circles that close."""
+    """The motions a + ``led`` (K,), which depend on where the motion before ended: absent words, increments, circles
+    that close."""
+    write, number = into.write[a:b, column], into.number[a:b, column]
     wants, owns = motions.wanted[a:b, column].tolist(), motions.own[a:b, column].tolist()
     relatives, closed = motions.relative[a:b, column].tolist(), motions.closed[a:b, column].tolist()
-    sources, halves = motions.source[a:b, column].tolist(), half.tolist()
+    sources, halves = (
+        motions.source[a:b, column].tolist(),
+        _half_steps(motions.decimals[a:b, column]).tolist(),
+    )
     origins, resumes = motions.origin[a:b, column].tolist(), motions.resumes[a:b, column].tolist()
     digits = motions.decimals[a:b, column].tolist()
-    ends, fixed = end.tolist(), motions.fixed[a:b].tolist()
+    ends, fixed = into.end[a:b, column].tolist(), motions.fixed[a:b].tolist()
     for k in led.tolist():
         begin = origins[k] if resumes[k] else ends[k - 1] if k else start
         want, own, d, within = wants[k], owns[k], digits[k], halves[k]
@@ -136,7 +137,7 @@ def _follow_led(
         number[k] = value
         motions.decimals[a + k, column] = d
         ends[k] = origin + value
-    end[:] = ends
+    into.end[a:b, column] = ends
 
 
 def _rounded(values: Floats, decimals: Ints) -> Floats:

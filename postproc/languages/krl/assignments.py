@@ -18,8 +18,9 @@ from postproc.languages.krl.lexing import (
     number,
     value_end,
 )
-from postproc.languages.krl.modal_state import NAN, OVERRIDES, ZERO, FrameIndex, Record
+from postproc.languages.krl.modal_state import NAN, OVERRIDES, FrameIndex, Record
 from postproc.languages.krl.motion_rows import RowRefusal
+from postproc.languages.krl.spatial import ZERO
 from postproc.languages.krl.statement_effects import BAS_COMMANDS, MODAL, READS_POSITION, bas
 from postproc.languages.krl.target import (
     AXES,
@@ -29,7 +30,6 @@ from postproc.languages.krl.target import (
     KrlTarget,
     UnknownValue,
     fields,
-    known,
     parse,
     shown,
 )
@@ -140,7 +140,7 @@ def command(run: ExecutionContext, statement: Statement, arguments: bytes) -> No
     word, argument = parsed
     if word == b"INITMOV":
         state.base = run.frames.known(0, ZERO, statement.line)
-        state.tool = numbered_frame(run, b"TOOL", 1, statement.line)
+        state.tool = run.numbered_frame(b"TOOL", 1, statement.line)
         speed = run.variables.get(b"DEF_VEL_CP")
         state.feed = speed if isinstance(speed, float) else NAN
         state.blend, state.tool_known = DEFAULT_ROUNDING, False
@@ -276,7 +276,7 @@ def _assigned_frame(
         return _indexed(run, table, _of_record(run, given) or given, line)
     copied = run.value(value)
     if isinstance(copied, FrameEntry) and copied.table == name[1:]:
-        return run.frames.known(copied.number, None, line)
+        return run.frames.in_entry(copied, line)
     if _EXTERNAL.search(value):
         return UnknownValue("KRL011", f"$BASE is moved by an external kinematic since line {line}")
     target = _value(run, assignment.value.rstrip(), assignment.at)
@@ -290,46 +290,7 @@ def _indexed(run: ExecutionContext, table: bytes, index: bytes, line: int) -> Fr
     value = run.value(index.strip())
     if not is_number(value) or value != int(value) or value < 0:
         return UnknownValue("KRL012", f"the number '{shown(index)}' is not a constant")
-    return numbered_frame(run, table, int(value), line)
-
-
-def numbered_frame(run: ExecutionContext, table: bytes, at: int, line: int) -> FrameIndex | UnknownValue:
-    """Entry ``at`` of BASE_DATA or TOOL_DATA as the program left it so far."""
-    if at == 0:
-        return run.frames.known(0, ZERO, line)
-    entry = b"[%d]" % at
-    if table + b"_DATA" in run.structure.later:
-        name = f"{table.decode()}_DATA"
-        return UnknownValue("KRL012", f"{name} is changed by an interrupt or a trigger")
-    value = run.variables.get(table + b"_DATA", entry)
-    if value is None and not run.structure.table_entries.isdisjoint((table + b"_DATA" + entry, None)):
-        name = f"{table.decode()}_DATA[{at}]"
-        return UnknownValue(
-            "KRL012", f"{name} has the value of the last run: the program assigns it elsewhere"
-        )
-    if value is None:
-        return run.frames.known(at, None, line)
-    numbers = value.numbers if isinstance(value, KrlTarget) else None
-    if numbers is not None:
-        return run.frames.known(at, numbers, line)
-    return UnknownValue("KRL012", f"{table.decode()}_DATA[{at}] is computed in the program")
-
-
-def _copied_entry(run: ExecutionContext, text: bytes) -> Value | None:
-    """What ``BASE_DATA[2]`` gives a variable: numbers, or the entry where only the cell states them."""
-    found = _DATA.match(text)
-    index = run.value(found[2].strip()) if found else None
-    if found is None or not is_number(index) or index != int(index) or index < 0:
-        return None
-    table = found[1].upper()
-    frame = numbered_frame(run, table, int(index), 0)
-    if isinstance(frame, UnknownValue):
-        return frame
-    number, values = run.frames.key(frame)
-    if values is not None or number is None:
-        return known(values or ZERO)
-    name = f"{table.decode()}_DATA[{number}]"
-    return FrameEntry("KRL002", f"its value is {name}, whose numbers no program states", table, number)
+    return run.numbered_frame(table, int(value), line)
 
 
 def _record(run: ExecutionContext, assignment: Assignment, before: Record | None) -> Record | None:
@@ -435,7 +396,7 @@ def _value(run: ExecutionContext, text: bytes, at: int) -> Value:
     """What a value gives; an aggregate of literals keeps its places, all else is a copy without them."""
     if text.startswith(b"{") and text.endswith(b"}") and text.count(b"{") == 1 and b'"' not in text:
         return parse(text, at, 0, run.value)
-    value = _copied_entry(run, text) or run.value(text)
+    value = run.value(text)
     if isinstance(value, FrameEntry):
         return value
     if isinstance(value, KrlTarget):

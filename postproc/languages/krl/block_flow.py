@@ -105,7 +105,7 @@ class BlockFlow(OpenBlocks):
         if not isinstance(value, (int, bytes)):
             return None
         for at in block.branches:
-            if self.repeating or self.jumped:
+            if self.repeating or self.went_back:
                 self.spent += 1
             case = self._item(at)
             if case.word == b"DEFAULT" and at != block.branches[-1]:
@@ -132,7 +132,7 @@ class BlockFlow(OpenBlocks):
     def _follow(self, pc: int, item: Statement, block: Block) -> int | None:
         """Enters a loop that runs as constants say; gives where it goes on, None where it does not."""
         run, word = self.run, block.word
-        if self.unfollowed.everything or (self.shallow and (self.unsure or run.walked)):
+        if self.unfollowed.everything or (self.shallow and (self.not_followed or run.walked)):
             return None
         if word == b"FOR":
             return self._for(pc, item, block)

@@ -111,7 +111,7 @@ class Calls(BlockFlow):
         if single and at <= pc and [frame.block for frame in inside] == list(blocks):
             while self.stack[active.blocks + len(inside) :]:
                 self._pop()
-            self.jumped = True
+            self.went_back = True
             run.spline = None
             return at
         if key in self.unfollowed.labels:
@@ -250,13 +250,13 @@ class Calls(BlockFlow):
 
     def _follows(self, name: bytes, routine: Routine) -> bool:
         """Whether a call is followed: its depth is allowed, and it is none of a routine by itself that maybe runs."""
-        run, unsure = self.run, self.unsure or self.run.walked
+        run, maybe = self.run, self.not_followed or self.run.walked
         if self.unfollowed.everything or run.opaque is not None or routine.is_main or routine.is_function:
             return False
-        later = name in run.structure.later or (unsure and self.shallow)
+        later = name in run.structure.later or (maybe and self.shallow)
         if later or routine.start in self.unfollowed.blocks:
             return False
-        if unsure and any(frame.block is routine for frame in self.stack):
+        if maybe and any(frame.block is routine for frame in self.stack):
             return False
         return len(self.activations) <= MOST_CALLS
 
@@ -314,8 +314,8 @@ class Calls(BlockFlow):
         self.activations.append(self._activation())
         own = run.routine.types if run.routine is not None else {}
         names = dict.fromkeys([*own, *routine.types])
-        if self.unsure or run.walked:
-            self.spent_unsure += len(names)
+        if self.not_followed or run.walked:
+            self.spent_not_followed += len(names)
         else:
             self.spent += len(names)
         run.routine = routine

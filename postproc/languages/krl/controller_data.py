@@ -12,11 +12,10 @@ from postproc.base.arrays import Ints
 from postproc.base.document import Document
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
-from postproc.languages.krl.assignments import numbered_frame
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.external_axes import six
-from postproc.languages.krl.modal_state import NAN, ZERO
-from postproc.languages.krl.spatial import Numbers
+from postproc.languages.krl.modal_state import NAN
+from postproc.languages.krl.spatial import ZERO, Numbers
 from postproc.languages.krl.target import COMPONENTS, KrlTarget, parse
 from postproc.toolpath import FrameRef
 from postproc.toolpath.initial_state import InitialState, Symbol
@@ -60,7 +59,7 @@ def with_declared(
     renamed = np.append(np.arange(len(frames)), -1)
     for index in np.unique(used[used >= 0]).tolist():
         frame = frames[index]
-        entry = entry_of(table, frame.number)
+        entry = entry_of(table, frame.entry)
         if frame.pose is None and entry in declared:
             values, _ = declared[entry]
             pose = Poses.from_abc(np.array(values[:3]) * MM, np.array(values[3:]) * DEG)
@@ -73,9 +72,9 @@ def start_with(run: ExecutionContext, initial: InitialState, symbols: Mapping[st
     """Sets what holds where the program starts; of FDAT_ACT a file says only what an earlier run left."""
     state = run.initial
     if initial.base is not None:
-        state.base = numbered_frame(run, b"BASE", initial.base, 0)
+        state.base = run.numbered_frame(b"BASE", initial.base, 0)
     if initial.tool is not None:
-        state.tool = numbered_frame(run, b"TOOL", initial.tool, 0)
+        state.tool = run.numbered_frame(b"TOOL", initial.tool, 0)
     if initial.words:
         state.point = six([initial.words.get(key.decode(), NAN) for key in COMPONENTS])
         state.point_frames = (state.base, state.tool)

@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.languages.krl.data import Declarations
 from postproc.languages.krl.expressions import Value, decided_by_digits, evaluate
-from postproc.languages.krl.lexing import Statement
-from postproc.languages.krl.modal_state import OVERRIDES, ZERO, FrameRegister, ModalState, Record, joined
+from postproc.languages.krl.lexing import FRAME_TABLES, Statement
+from postproc.languages.krl.modal_state import (
+    OVERRIDES,
+    FrameIndex,
+    FrameRegister,
+    ModalState,
+    Record,
+    joined,
+)
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.other_modules import OtherModules
 from postproc.languages.krl.program_blocks import Block, Routine
 from postproc.languages.krl.program_structure import ProgramStructure
+from postproc.languages.krl.spatial import ZERO
 from postproc.languages.krl.statement_effects import Effect, Effects
-from postproc.languages.krl.target import UnknownValue, known, shown
+from postproc.languages.krl.target import COMPONENTS, FrameEntry, KrlTarget, UnknownValue, known, shown
 from postproc.languages.krl.variables import VariableFacts, Variables
 from postproc.languages.krl.vectorised import Item
+
+_ENTRY = re.compile(rb"\[(\d{1,9})\]\Z")
 
 
 @dataclass(frozen=True)
@@ -148,16 +159,39 @@ class ExecutionContext:
             return self.routine.types[name]
         return self.declarations.types.get(name, b"")
 
+    def numbered_frame(self, table: bytes, at: int, line: int) -> FrameIndex | UnknownValue:
+        """Entry ``at`` of BASE_DATA or TOOL_DATA (``table`` without _DATA) as the program left it so far."""
+        if at == 0:
+            return self.frames.known(0, ZERO, line)
+        entry, name = b"[%d]" % at, table.decode() + "_DATA"
+        if table + b"_DATA" in self.structure.later:
+            return UnknownValue("KRL012", f"{name} is changed by an interrupt or a trigger")
+        value = self.variables.get(table + b"_DATA", entry)
+        if value is None and not self.structure.table_entries.isdisjoint((table + b"_DATA" + entry, None)):
+            why = "has the value of the last run: the program assigns it elsewhere"
+            return UnknownValue("KRL012", f"{name}[{at}] {why}")
+        if value is None:
+            return self.frames.known(at, None, line)
+        if isinstance(value, FrameEntry) and value.table == table:
+            return self.frames.in_entry(value, line)
+        numbers = value.numbers if isinstance(value, KrlTarget) else None
+        if numbers is not None:
+            return self.frames.known(at, numbers, line)
+        return UnknownValue("KRL012", f"{name}[{at}] is computed in the program")
+
     def lookup(self, name: bytes, path: bytes) -> Value | None:
         """The value of a variable, where nothing else than this program's flow can have changed it."""
+        if name in FRAME_TABLES and (entry := _ENTRY.match(path)):
+            table = name.partition(b"_")[0]
+            frame = self.numbered_frame(table, int(entry[1]), 0)
+            return self.frames.copied(frame, table) if isinstance(frame, FrameIndex) else frame
         return self.resolve(name, path, self.variables.get(name, path))
 
     def resolve(self, name: bytes, path: bytes, value: Value | None) -> Value | None:
         """The same of a variable that has this ``value`` as far as the program assigns it."""
         if value is None and name.startswith(b"$") and not path:
             if name in (b"$BASE", b"$TOOL"):
-                numbers = self.frames.values(self.state.base if name == b"$BASE" else self.state.tool)
-                return known(numbers) if numbers is not None else None
+                return self.frames.copied(self.state.base if name == b"$BASE" else self.state.tool, name[1:])
             return known(ZERO) if name in (b"$NULLFRAME", b"$WORLD") else None
         if value is None:
             if self.type_of(name):
@@ -165,6 +199,8 @@ class ExecutionContext:
             return None
         if name in self.structure.later:
             return UnknownValue("KRL002", f"{shown(name)} is changed by an interrupt or a trigger")
+        if isinstance(value, FrameEntry) and path.rpartition(b".")[2] in COMPONENTS:
+            return UnknownValue(value.code, value.message)
         return value
 
     def record(self, name: bytes) -> Record | None:
@@ -212,7 +248,7 @@ class ExecutionContext:
         if one is None or other is None:
             return one or other
         sources = self.rows.joined(one.state.sources | other.state.sources)
-        state = replace(joined(one.state, other.state), sources=sources)
+        state = joined(one.state, other.state).changed(sources=sources)
         return Flow(state, self.variables.joined(one.variables, other.variables))
 
     def raised(self, head: Flow, back: Flow) -> Flow:

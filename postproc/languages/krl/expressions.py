@@ -8,11 +8,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 
 from postproc.languages.krl.lexing import NAME, is_integer, is_number, number
-from postproc.languages.krl.spatial import product
-from postproc.languages.krl.target import COMPONENTS, KrlTarget, UnknownValue, known, parse, shown
+from postproc.languages.krl.spatial import inverse, product
+from postproc.languages.krl.target import COMPONENTS, FrameEntry, KrlTarget, UnknownValue, known, parse, shown
 
 Value = int | float | bool | bytes | KrlTarget | UnknownValue
 Lookup = Callable[[bytes, bytes], Value | None]
@@ -170,8 +171,8 @@ class _Parser:
             right = self._logic(depth, 0)
             ordered = operator not in (b"==", b"<>")
             if (
-                isinstance(left, KrlTarget)
-                or isinstance(right, KrlTarget)
+                isinstance(left, KrlTarget | FrameEntry)
+                or isinstance(right, KrlTarget | FrameEntry)
                 or isinstance(left, bytes) != isinstance(right, bytes)
             ):
                 raise self._unknown("it compares points and words")
@@ -253,9 +254,16 @@ class _Parser:
         while self.token == b":":
             self._next()
             right = self._operand(depth)
+            second = right.numbers if isinstance(right, KrlTarget) else None
+            if isinstance(left, FrameEntry) and second is not None:
+                left = replace(left, within=product(left.within, second))
+                continue
+            for each in (left, right):
+                if isinstance(each, FrameEntry):
+                    raise self._unknown(each.message)
             if not isinstance(left, KrlTarget) or not isinstance(right, KrlTarget):
                 raise self._unknown("':' is applied to something that is not a point")
-            first, second = left.numbers, right.numbers
+            first = left.numbers
             if first is None or second is None:
                 raise self._unknown("':' is applied to a point that is not known in all of X, Y, Z, A, B, C")
             values = known(product(first, second))
@@ -341,15 +349,22 @@ class _Parser:
         value = self.lookup(name, path)
         if value is None:
             raise _NotConstant(_no_constant(name + path))
-        if isinstance(value, UnknownValue):
+        if isinstance(value, UnknownValue) and not isinstance(value, FrameEntry):
             raise _NotConstant(value)
         return value
 
     def _call(self, name: bytes, depth: int) -> Value:
         function = _FUNCTIONS.get(name)
-        if function is None:
+        if function is None and name != b"INV_POS":
             raise self._unknown(f"it calls {shown(name)}")
         self._next()
+        if function is None:
+            point = self.comparison(depth + 1)
+            self._expect(b")")
+            numbers = point.numbers if isinstance(point, KrlTarget) else None
+            if numbers is None:
+                raise self._unknown("INV_POS is applied to what is not known in all of X, Y, Z, A, B, C")
+            return known(inverse(numbers))
         given = [self._number(self.comparison(depth + 1))]
         while self.token == b",":
             self._next()

@@ -152,8 +152,8 @@ def _frames_used(toolpath: Toolpath) -> dict[str, FrameRef]:
     for table, used in ((b"BASE", toolpath.base), (b"TOOL", toolpath.tool)):
         for index in np.unique(used).tolist():
             frame = toolpath.frames[index] if index >= 0 else None
-            if frame is not None and frame.number and frame.pose is None:
-                found[entry_of(table, frame.number)] = frame
+            if frame is not None and frame.entry and frame.pose is None:
+                found[entry_of(table, frame.entry)] = frame
     return found
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
-from operator import attrgetter
+from dataclasses import dataclass, field, fields
+from itertools import compress
+from operator import attrgetter, is_not
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,11 @@ import numpy as np
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
 from postproc.languages.krl.external_axes import ALL_LOST, UNSTATED, six
-from postproc.languages.krl.spatial import Numbers
+from postproc.languages.krl.spatial import ZERO, Numbers
 from postproc.languages.krl.statement_effects import Effect
-from postproc.languages.krl.target import Six, UnknownValue
+from postproc.languages.krl.target import FrameEntry, KrlTarget, Six, UnknownValue, known
 from postproc.toolpath import LOST, ArcFrame, FrameRef, OrientationMode
 
-ZERO: Numbers = (0.0,) * 6
 NOT_TO_TARGET = (OrientationMode.CONSTANT, OrientationMode.UNKNOWN)
 """Modes in which a path motion may end with another orientation than that of its target."""
 NAN = float("nan")
@@ -41,34 +41,63 @@ class FrameIndex:
     line: int = field(default=0, compare=False)
 
 
+def _pose(values: Numbers) -> Poses:
+    return Poses.from_abc(np.array(values[:3]) * MM, np.array(values[3:]) * DEG)
+
+
 class FrameRegister:
     """The frames of a program, each once."""
 
     def __init__(self) -> None:
-        self._index: dict[tuple[int | None, Numbers | None], int] = {}
+        self._index: dict[tuple[int | None, Numbers | None, bool], int] = {}
         self._values: list[Numbers | None] = []
+        self._within: list[Numbers] = []
         self._refs: list[FrameRef] = []
 
     def known(self, number: int | None, values: Numbers | None, line: int) -> FrameIndex:
         """The frame of this number and pose (X..C, mm and deg); number 0 is the identity."""
         if number == 0:
             values = ZERO
-        key = (number, values)
+        key = (number, values, False)
         if key not in self._index:
-            pose = None
-            if values is not None:
-                pose = Poses.from_abc(np.array(values[:3]) * MM, np.array(values[3:]) * DEG)
+            pose = None if values is None else _pose(values)
             self._index[key] = len(self._refs)
             self._values.append(values)
+            self._within.append(ZERO)
             self._refs.append(FrameRef(number, pose, line))
+        return FrameIndex(self._index[key], line)
+
+    def in_entry(self, entry: FrameEntry, line: int) -> FrameIndex:
+        """The frame that is, or is stated in, an entry whose pose the program does not state."""
+        if entry.within == ZERO:
+            return self.known(entry.number, None, line)
+        key = (entry.number, entry.within, True)
+        if key not in self._index:
+            self._index[key] = len(self._refs)
+            self._values.append(None)
+            self._within.append(entry.within)
+            self._refs.append(FrameRef(None, None, line, in_entry=(entry.number, _pose(entry.within))))
         return FrameIndex(self._index[key], line)
 
     def values(self, frame: FrameIndex | UnknownValue) -> Numbers | None:
         return self._values[frame.index] if isinstance(frame, FrameIndex) else None
 
-    def key(self, frame: FrameIndex) -> tuple[int | None, Numbers | None]:
-        """Number and pose of a frame, as ``known`` takes them."""
-        return self._refs[frame.index].number, self._values[frame.index]
+    def of_other(self, frame: FrameIndex, other: FrameRegister, line: int) -> FrameIndex:
+        """The same frame as one of another register."""
+        entry = other._refs[frame.index].in_entry
+        if entry is not None:
+            return self.in_entry(FrameEntry("", "", b"", entry[0], other._within[frame.index]), line)
+        return self.known(other._refs[frame.index].number, other._values[frame.index], line)
+
+    def copied(self, frame: FrameIndex | UnknownValue, table: bytes) -> KrlTarget | FrameEntry | None:
+        """What a variable holds to which a frame of ``table``, BASE or TOOL, is assigned; None where it is unknown."""
+        if not isinstance(frame, FrameIndex):
+            return None
+        values, entry = self._values[frame.index], self._refs[frame.index].entry
+        if values is not None or entry is None:
+            return known(values or ZERO)
+        why = f"its value is {table.decode()}_DATA[{entry}], whose numbers no program states"
+        return FrameEntry("KRL002", why, table, entry, self._within[frame.index])
 
     def refs(self) -> tuple[FrameRef, ...]:
         return tuple(self._refs)
@@ -159,6 +188,12 @@ class ModalState:
         other.__dict__ = self.__dict__.copy()  # there are many, and __init__ takes several times as long
         return other
 
+    def changed(self, **values: object) -> ModalState:
+        """The same with other values."""
+        other = self.copy()
+        other.__dict__.update(values)
+        return other
+
     def lose_point(self, why: str) -> None:
         self.point = self.axes = self.point_frames = self.anchor = None
         self.point_unknown = why
@@ -192,15 +227,19 @@ class ModalState:
             self.frames_record = self.path_record = self.axis_record = None
 
 
-_NAMES = tuple(entry.name for entry in fields(ModalState))
+_OF_POINT = ("point", "point_frames", "anchor", "point_unknown")
+_POINT_OF = attrgetter(*_OF_POINT)
+_NAMES = tuple(entry.name for entry in fields(ModalState) if entry.name not in (*_OF_POINT, "sources"))
 _VALUES = attrgetter(*_NAMES)
 
 
 def joined(one: ModalState, other: ModalState) -> ModalState:
     """What holds where two paths meet, but for ``sources``; ``one`` itself where the other path adds nothing."""
     changed: dict[str, object] = {}
-    for name, a, b in zip(_NAMES, _VALUES(one), _VALUES(other), strict=True):
-        if a is b or name == "sources" or (name in _OF_POINT) or _same(a, b):
+    values, others = _VALUES(one), _VALUES(other)
+    for name in compress(_NAMES, map(is_not, values, others)):
+        a, b = getattr(one, name), getattr(other, name)
+        if _same(a, b):
             continue
         value = _JOINS[name](a, b)
         if not _same(value, a):
@@ -208,7 +247,7 @@ def joined(one: ModalState, other: ModalState) -> ModalState:
     point = _joined_points(one, other)
     if not all(map(_same, point, _POINT_OF(one))):
         changed |= zip(_OF_POINT, point, strict=True)
-    return replace(one, **changed) if changed else one  # type: ignore[arg-type]
+    return one.changed(**changed) if changed else one
 
 
 def _same(one: object, other: object) -> bool:
@@ -226,10 +265,6 @@ def _joined_frames(
     if isinstance(other, UnknownValue):
         return other
     return UnknownValue("KRL005", f"{name} varies: line {one.line} or line {other.line}")
-
-
-_OF_POINT = ("point", "point_frames", "anchor", "point_unknown")
-_POINT_OF = attrgetter(*_OF_POINT)
 
 
 def _varies(one: ModalState, other: ModalState) -> str:

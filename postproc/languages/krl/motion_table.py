@@ -77,7 +77,7 @@ def _first(rows: MotionRows) -> Numbers:
 class MotionTable:
     """The entries of all rows as arrays, which takes the rows' own away; rare lengths and angles are in mm and deg.
 
-    ``word``: offset of the motion's word; ``loose``: numbers of the rows that were read alone; ``spots``: None where
+    ``word``: offset of the motion's word; ``scalar``: numbers of the rows that were read alone; ``spots``: None where
     the places are not wanted.
     """
 
@@ -95,7 +95,7 @@ class MotionTable:
         self.spots = Spots(n, size) if places else None
         self.axes: dict[int, Numbers] = {}
         self.ways: dict[int, tuple[float, ...]] = {}
-        self.loose: list[tuple[int, MotionRow]] = []
+        self.scalar_rows: list[tuple[int, MotionRow]] = []
         self.external: Floats = np.broadcast_to(np.array(_first(rows)), (n, 6))
         at = 0
         rows.chunks.reverse()
@@ -148,7 +148,7 @@ class MotionTable:
 
     def _fill(self, at: int, rows: list[MotionRow]) -> None:
         part = slice(at, at + len(rows))
-        self.loose += zip(range(at, at + len(rows)), rows, strict=True)
+        self.scalar_rows += zip(range(at, at + len(rows)), rows, strict=True)
         columns = _columns(MotionRow, rows)
         self._place(part, np.array(columns.values))
         states = [(-1, -1) if t is None else (t.status, t.turn) for t in columns.target]

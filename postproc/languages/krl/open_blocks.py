@@ -25,11 +25,11 @@ class OpenBlocks:
     """Notes what is open, and returns to earlier places.
 
     reachable: some path leads here; else lines are passed over up to a place where one does.  stack: open blocks and
-    calls; activations: routines that run; repeating, unsure: how many of the open blocks are loops and calls that are
-    followed, or are not followed. seen: statements that ran in loops and calls; stops: 1 + whether the advance run
-    stops at a statement, 0 where that was not asked; spent, spent_unsure: how often such ones ran again, surely or
-    maybe; jumped: a GOTO led back, so that every line may run again; shallow: where it is not known that they run,
-    loops and calls are not followed any more; steps, passes: statements that were gone over, and how many may be.
+    calls; activations: routines that run; repeating, not_followed: how many of the open blocks are loops and calls that
+    are followed, or are not followed. seen: statements that ran in loops and calls; stops: 1 + whether the advance run
+    stops at a statement, 0 where that was not asked; spent, spent_not_followed: how often such ones ran again, surely
+    or maybe; went_back: a GOTO led back, so that every line may run again; shallow: where it is not known that they
+    run, loops and calls are not followed any more; steps, passes: statements that were gone over, and how many may be.
     """
 
     def __init__(self, run: ExecutionContext, unfollowed: Unfollowed) -> None:
@@ -38,11 +38,11 @@ class OpenBlocks:
         self._labels = KeyNumbers()
         self.activations = [self._activation()]
         self.reachable = True
-        self.repeating = self.unsure = self.spent = self.spent_unsure = self.steps = 0
+        self.repeating = self.not_followed = self.spent = self.spent_not_followed = self.steps = 0
         self.most_steps = len(run.code) + MOST_STEPS
         self.seen = bytearray(len(run.code))
         self.stops = bytearray(len(run.code))
-        self.jumped = self.shallow = False
+        self.went_back = self.shallow = False
         self.text_called: set[bytes] = set()
         self.comments: dict[int, Annotation] = {}
 
@@ -53,7 +53,7 @@ class OpenBlocks:
         """Nothing is open."""
         self.stack, self.reachable = [], True
         self.activations = [self._activation()]
-        self.repeating = self.unsure = 0
+        self.repeating = self.not_followed = 0
         self.run.opaque = self.run.spline = None
 
     def _checkpoint(self, copies: bool = False) -> Checkpoint:
@@ -90,7 +90,7 @@ class OpenBlocks:
 
     def _count(self) -> None:
         self.repeating = sum(f.followed and f.block.word in _REPEATED for f in self.stack)
-        self.unsure = sum(not f.followed for f in self.stack)
+        self.not_followed = sum(not f.followed for f in self.stack)
         self.run.opaque = next((f.block for f in self.stack if not f.followed and f.block.broken), None)
 
     def _push(self, block: Block, followed: bool) -> BlockFrame:
@@ -100,13 +100,13 @@ class OpenBlocks:
             self.run.spline = replace(self.run.spline, can_be_entered=False)
         self.stack.append(frame)
         self.repeating += followed and block.word in _REPEATED
-        self.unsure += not followed
+        self.not_followed += not followed
         return frame
 
     def _pop(self) -> BlockFrame:
         frame = self.stack.pop()
         self.repeating -= frame.followed and frame.block.word in _REPEATED
-        self.unsure -= not frame.followed
+        self.not_followed -= not frame.followed
         if frame.block is self.run.opaque:
             self.run.opaque = None
         return frame
@@ -153,21 +153,21 @@ class OpenBlocks:
         if self.spent > BUDGET and not self.unfollowed.everything:
             self.unfollowed.everything = True
             outermost = next((frame for frame in self.stack if frame.repeats), None)
-            if self.jumped or outermost is None:
+            if self.went_back or outermost is None:
                 raise Restart
             at = self._abort(outermost)
             item = run.code[at]
             assert isinstance(item, Statement)
             self._report_length(item)
             return at
-        if self.spent_unsure > BUDGET and self.shallow is False:
+        if self.spent_not_followed > BUDGET and self.shallow is False:
             self.shallow = True
-        if self.spent_unsure > BUDGET:
+        if self.spent_not_followed > BUDGET:
             first = next((i for i, frame in enumerate(self.stack) if not frame.followed), 0)
             inner = next((frame for frame in self.stack[first:] if frame.repeats), None)
             if inner is not None:
                 return self._abort(inner)
-            if self.jumped and not self.unfollowed.everything:
+            if self.went_back and not self.unfollowed.everything:
                 self.unfollowed.everything = True
                 raise Restart
         return None

@@ -312,5 +312,4 @@ def _moved(
 ) -> FrameIndex | UnknownValue:
     if isinstance(frame, UnknownValue):
         return frame
-    number, values = source.key(frame)
-    return target.known(number, values, line)
+    return target.of_other(frame, source, line)

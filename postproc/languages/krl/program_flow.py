@@ -58,6 +58,7 @@ from postproc.languages.krl.statement_effects import (
 )
 from postproc.languages.krl.vectorised import Item, VectorisedLines
 from postproc.toolpath import Annotation
+from postproc.toolpath.meant_comments import meant_to_speak
 
 _ANNOTATION = re.compile(rb";[ \t]*(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
 
@@ -198,15 +199,15 @@ class ProgramFlow(Calls):
         self.steps += 1
         if not self.reachable:
             return self._pass_over(pc, item)
-        if self.repeating or self.jumped:
+        if self.repeating or self.went_back:
             if self.seen[pc]:
                 count = len(item) if isinstance(item, VectorisedLines) else 1
-                if self.unsure or run.walked:
-                    self.spent_unsure += count
+                if self.not_followed or run.walked:
+                    self.spent_not_followed += count
                 else:
                     self.spent += count
             self.seen[pc] = 1
-            if self.spent > BUDGET or self.spent_unsure > BUDGET:
+            if self.spent > BUDGET or self.spent_not_followed > BUDGET:
                 elsewhere = self._give_up()
                 if elsewhere is not None:
                     return elsewhere
@@ -343,7 +344,7 @@ class ProgramFlow(Calls):
         note = Annotation(len(run.rows), text, item.line)
         if _ANNOTATION.match(item.comment):
             run.rows.annotations.append(note)
-        elif item.kind == StatementKind.COMMENT:
+        elif item.kind == StatementKind.COMMENT or meant_to_speak(text):
             self.comments.setdefault(item.line, note)
 
     def _later(self, item: Statement) -> None:

@@ -24,6 +24,7 @@ from postproc.languages.krl.lexing import Statement, StatementKind, statement
 from postproc.languages.krl.spatial import Numbers
 from postproc.languages.krl.target import COMPONENTS, KrlTarget, parse
 from postproc.languages.krl.vectorised import Item, VectorisedLines
+from postproc.toolpath.meant_comments import MAY_BE_MEANT
 
 FEWEST, MOST = 8, 1 << 14
 """Lines of a run that are read together: with fewer it does not pay, with more it takes memory."""
@@ -40,7 +41,7 @@ _LINE = (
     + (_B + rb",").join(_B + key + rb"[ \t]++" + _REAL for key in COMPONENTS)
     + rb"(?:" + _B + rb"\}|" + _MORE + _B + rb"\})"
     + _B + rb"(?:C_(?:DIS|VEL|ORI|PTP)" + _B + rb")?+"
-    + rb"(?:;(?![ \t]*(?:FORCE|COMPENSATE))[^\r\n{}]*+)?+\r?\n"
+    + rb"(?:;(?![ \t]*(?:FORCE|COMPENSATE|%s))[^\r\n{}]*+)?+\r?\n" % MAY_BE_MEANT
 )  # fmt: skip
 _RUN = re.compile(rb"^(?:%s){%d,%d}+" % (_LINE, FEWEST, MOST), re.I | re.M)
 _EXTERNAL = re.compile(rb"(?<![ \t])" + _B + rb"," + _B + rb"[Ee]([1-6])[ \t]++(" + _REAL + rb")")

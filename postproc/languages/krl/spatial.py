@@ -9,6 +9,8 @@ Numbers = tuple[float, float, float, float, float, float]
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
 
+ZERO: Numbers = (0.0,) * 6
+"""The frame in which it is stated itself."""
 STRAIGHT = 1e-6
 """Sine of the angle at the start of an arc below which its three points lie on a line."""
 
@@ -59,6 +61,14 @@ def product(first: Numbers, second: Numbers) -> Numbers:
         first_row, second_row, third_row = ((_dot(row, u), _dot(row, v), _dot(row, w)) for row in r)
         a, b, c = angles((first_row, second_row, third_row))
     return first[0] + x, first[1] + y, first[2] + z, a, b, c
+
+
+def inverse(frame: Numbers) -> Numbers:
+    """KRL's ``INV_POS(frame)``: with it, ``product(inverse(frame), frame)`` is no displacement."""
+    u, v, w = zip(*rotation(*frame[3:]), strict=True)
+    back: Matrix = (u, v, w)
+    x, y, z = turned(back, frame[:3])
+    return -x, -y, -z, *angles(back)
 
 
 def arc(start: Vector, through: Vector, end: Vector, angle: float | None) -> Arc | None:

@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 from postproc.languages.krl.lexing import NAME, is_number, number, value_end
-from postproc.languages.krl.spatial import Numbers
+from postproc.languages.krl.spatial import ZERO, Numbers
 
 Six = tuple[float | None, float | None, float | None, float | None, float | None, float | None]
 NOWHERE = (-1,) * 6
@@ -64,10 +64,12 @@ class UnknownValue:
 
 @dataclass(frozen=True, slots=True)
 class FrameEntry(UnknownValue):
-    """A copy of an entry of BASE_DATA or TOOL_DATA whose numbers only the cell states."""
+    """A copy of an entry of BASE_DATA or TOOL_DATA whose numbers only the cell states, or (``within``: X..C, mm and
+    deg) of a frame that is stated in it."""
 
     table: bytes = b""
     number: int = 0
+    within: Numbers = ZERO
 
 
 class KrlTarget(NamedTuple):

@@ -304,12 +304,12 @@ def _number_texts(rows: MotionRows, table: MotionTable, spots: Spots) -> None:
 
     nodes = dict(zip(rows.arcs, range(n, n + len(rows.arcs)), strict=True))
     auxiliary = [(rows.arcs[row].file, rows.arcs[row].start) for row in nodes]
-    loose = np.array([row for row, _ in table.loose], np.int64)
+    scalar = np.array([row for row, _ in table.scalar_rows], np.int64)
     files, starts = (
-        [spots_of[loose].ravel(), np.array([one[i] for one in auxiliary], spots_of.dtype).ravel()]
+        [spots_of[scalar].ravel(), np.array([one[i] for one in auxiliary], spots_of.dtype).ravel()]
         for i, spots_of in enumerate((spots.file, spots.start))
     )
-    of = np.concatenate([np.repeat(loose, 6), np.repeat(np.arange(n, n + len(nodes)), 3)])
+    of = np.concatenate([np.repeat(scalar, 6), np.repeat(np.arange(n, n + len(nodes)), 3)])
     for one, other in _sharing(of, np.concatenate(files), np.concatenate(starts)):
         first, second = sorted((top(one), top(other)))
         if first != second:

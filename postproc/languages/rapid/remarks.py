@@ -14,6 +14,7 @@ from postproc.languages.rapid.module_rows import ModuleRows
 from postproc.languages.rapid.propagation import Propagation
 from postproc.languages.rapid.syntax_tree import Remark
 from postproc.toolpath import Annotation, ProgramComments
+from postproc.toolpath.meant_comments import meant_to_speak
 
 _MARKER = re.compile(rb"[ \t]*![ \t]*" + MARK.encode() + rb"[^\r\n]*")
 
@@ -75,7 +76,9 @@ def _others(
             if remark.start not in flow.passed:
                 message = f"the comment {remark.text[:40]!r} is where no statement is run"
                 findings.append(Finding("RAP016", message, str(document.path), line, column))
-        elif remark.alone and remark.text and not remark.text.startswith(MARK):
+        elif (remark.alone and remark.text and not remark.text.startswith(MARK)) or meant_to_speak(
+            remark.text
+        ):
             row = flow.passed.get(remark.start, (remark, 0))[1]
             comments.append(Annotation(row, remark.text, line))
     return tuple(comments), findings
