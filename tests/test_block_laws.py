@@ -21,6 +21,7 @@ SIZES = [1, 2, 3, 7]
 
 def in_blocks_of(monkeypatch, rows):
     monkeypatch.setattr(postproc.base.batches, "ROWS", rows)
+    monkeypatch.setattr(postproc.base.batches, "SPAN", rows)
     monkeypatch.setattr(postproc.compensation.divisible_motions, "ROWS", rows)
 
 

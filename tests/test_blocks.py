@@ -5,7 +5,8 @@ import threading
 import numpy as np
 import pytest
 
-from postproc.base.batches import THREADS, blocks, in_blocks, threads
+from postproc.base import batches
+from postproc.base.batches import THREADS, blocks, in_blocks, in_spans, select_rows, spans, threads
 
 
 @pytest.mark.parametrize("count", [0, 1, 9, 10, 11, 95])
@@ -65,3 +66,27 @@ def test_the_number_of_threads_can_be_said(monkeypatch, word, least, most):
 def test_blocks_leave_no_row_out():
     assert blocks(0) == []
     assert blocks(7, 3) == [slice(0, 3), slice(3, 6), slice(6, 7)]
+
+
+@pytest.mark.parametrize("span", [1, 5, 64, 10_000])
+@pytest.mark.parametrize(
+    "chosen", [[], [0], [63, 64], [0, 1, 2, 3, 4, 5, 90], list(range(0, 1000, 7)), [999]]
+)
+def test_blocks_of_rows_here_and_there_lie_close_together(monkeypatch, span, chosen):
+    monkeypatch.setattr(batches, "SPAN", span)
+    rows = np.array(chosen, int)
+    parts = spans(rows, 4)
+    assert [row for part in parts for row in rows[part]] == chosen
+    for part in parts:
+        assert min(2, len(rows)) <= len(rows[part]) <= 4 + 2
+        inner = rows[part][1:-1]  # beside them there may be one each that would be alone
+        assert len(inner) < 2 or np.ptp(inner) < span
+    assert list(in_spans(lambda part: rows[part].tolist(), rows, 4)) == [
+        rows[part].tolist() for part in parts
+    ]
+    values = np.random.default_rng(1).random((1000, 2))
+    assert np.array_equal(select_rows(values, rows), values[rows])
+
+
+def test_rows_of_a_small_program_are_one_block():
+    assert spans(np.arange(0, batches.SPAN, 100)) == blocks(-(-batches.SPAN // 100))

@@ -68,6 +68,7 @@ def results(program: Path, output: Path) -> dict[str, bytes]:
 
 def set_blocks(monkeypatch, rows: int, threads: int) -> None:
     monkeypatch.setattr(batches, "ROWS", rows)
+    monkeypatch.setattr(batches, "SPAN", rows + 1)
     monkeypatch.setenv(batches.THREADS, str(threads))
 
 
@@ -226,6 +227,34 @@ def test_pages_are_given_back_and_keep_what_they_hold(small, monkeypatch):
 
 
 @pytest.mark.slow
+@alone
+def test_rows_here_and_there_do_not_bring_the_whole_array(small, monkeypatch):
+    """Some bytes of each page are read; with all of them at once the array would be resident."""
+    monkeypatch.setattr(batches, "SPAN", 1 << 19)
+    seen, release = [], paged_memory.release_pages
+
+    def look() -> None:
+        with open("/proc/self/statm") as stream:
+            seen.append(int(stream.read().split()[2]) * 4096)
+        release()
+
+    monkeypatch.setattr(batches, "release_pages", look)
+    monkeypatch.setattr(paged_memory, "EVERY", 60.0)  # nobody else gives pages back
+    with paged_memory.large_arrays_in_files(Path(__file__)):
+        values = np.arange(8 << 20)
+        rows = np.arange(0, len(values), 256)
+        release()
+        with open("/proc/self/statm") as stream:
+            before = int(stream.read().split()[2]) * 4096
+        assert np.array_equal(batches.select_rows(values, rows), rows)
+        assert len(seen) == 16
+        assert max(seen) < before + 3 * values.nbytes // 16
+        seen.clear()
+        values[rows].sum()
+        look()
+        assert seen[0] > before + values.nbytes // 2  # this is what is measured
+
+
 @alone
 def test_giving_pages_back_touches_no_other_memory(small):
     """Arrays end at any moment, and other memory comes to where they were, while pages are given back all the time."""

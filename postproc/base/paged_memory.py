@@ -75,6 +75,9 @@ _FIRST_PAGE_ALONE = bytes(_HEAD // 2) + (_PAGE | _IS_MMAPPED).to_bytes(_HEAD // 
 """The head of a block of the C library that is one page."""
 
 _libc: Any = ctypes.CDLL(None) if sys.platform == "linux" else None
+_libc_at_once: Any = ctypes.PyDLL(None) if sys.platform == "linux" else None
+"""The same, whose functions keep the lock of the interpreter: to get it back takes 5 ms for each thread that computes,
+as long as many files' pages."""
 
 current_storage: ContextVar[PagedStorage | None] = ContextVar("current_storage", default=None)
 
@@ -250,7 +253,8 @@ class PagedStorage:
                 return
         with self._lists:
             for file in self.files:
-                _libc.madvise(ctypes.c_void_p(file.address), ctypes.c_size_t(file.mapped), _NOT_NEEDED_NOW)
+                address, length = ctypes.c_void_p(file.address), ctypes.c_size_t(file.mapped)
+                _libc_at_once.madvise(address, length, _NOT_NEEDED_NOW)
 
     @contextmanager
     def watched(self) -> Iterator[None]:

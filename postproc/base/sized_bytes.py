@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Iterable
 
-from postproc.base.paged_memory import room_in_file
+from postproc.base.paged_memory import LOOK, release_pages, room_in_file
 
 _new_bytes = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_char_p, ctypes.c_ssize_t)(
     ("PyBytes_FromStringAndSize", ctypes.pythonapi)
@@ -23,12 +23,19 @@ class SizedBytes:
         first = id(self.text) + bytes.__basicsize__ - 1
         self.rest = memoryview((ctypes.c_char * size).from_address(first)).cast("B")
         self.more: list[bytes] = []
+        self.since = 0
 
     def write(self, part: bytes | memoryview) -> None:
         """Put ``part`` behind what is there."""
-        fitting = min(len(part), len(self.rest))
-        self.rest[:fitting] = part[:fitting]
-        self.rest = self.rest[fitting:]
+        fitting, view = min(len(part), len(self.rest)), memoryview(part)
+        for at in range(0, fitting, LOOK):  # nobody else works, or gives pages back, while bytes are copied
+            size = min(LOOK, fitting - at)
+            self.rest[:size] = view[at : at + size]
+            self.rest = self.rest[size:]
+            self.since += size
+            if self.since >= LOOK:
+                self.since = 0
+                release_pages()
         if fitting < len(part):
             self.more.append(bytes(part[fitting:]))
 

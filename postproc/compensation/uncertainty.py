@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
+from postproc.base.batches import in_spans, select_rows
 from postproc.base.geometry import Poses, lengths
 from postproc.cell import ForceVectorInterval
 from postproc.compensation.correct import CorrectionResult
@@ -94,7 +95,7 @@ def evaluate_uncertainty(
     that of 2,000.
     """
     rows = select_motions(result)
-    forced = bool(task.wrench[rows].any())
+    forced = bool(select_rows(task.wrench, rows).any())
     force = ForceUncertainty.of(task, rows, force_ci95)
     known = input_uncertainties(task.model, force.largest, forced, vector)
     if force.incomplete:
@@ -127,9 +128,7 @@ def evaluate_uncertainty(
     share = variance_shares(moves[0], known.covariance)
     budget = _by_name(known.entries, share)
 
-    error, moves = error_sensitivities(
-        task, known.entries, rows, _commands(task, result, rows), corrected=True
-    )
+    error, moves = _corrected_sensitivities(task, result, known.entries, rows)
     error = _with_rounded(result, rows, error)
     moves = force.scaled(moves, known.entries, rows)
     spread = covariances(moves, known.covariance)
@@ -143,10 +142,25 @@ def evaluate_uncertainty(
         after=expanded_uncertainty_of_largest(error[sound], moves[sound], known.covariance)
         if sound.any()
         else np.nan,
-        expanded=np.stack([expanded_uncertainty(result.deflection[rows], spread), after], axis=1),
+        expanded=np.stack(
+            [expanded_uncertainty(select_rows(result.deflection, rows), spread), after], axis=1
+        ),
         budget=budget if share.any() else (),
         unstable=int((~sound).sum()),
     )
+
+
+def _corrected_sensitivities(
+    task: CompensationProblem, result: CorrectionResult, entries: Sequence[UncertainInput], rows: Ints
+) -> tuple[Floats, Floats]:
+    """``error_sensitivities`` (K, 3), (K, 3, P) of ``rows`` (K,) as they are corrected."""
+
+    def of_part(part: slice) -> tuple[Floats, Floats]:
+        some = rows[part]
+        return error_sensitivities(task, entries, some, _commands(task, result, some), corrected=True)
+
+    error, moves = zip(*in_spans(of_part, rows), strict=True)
+    return np.concatenate(error), np.concatenate(moves)
 
 
 def _commands(task: CompensationProblem, result: CorrectionResult, rows: Ints) -> Poses:

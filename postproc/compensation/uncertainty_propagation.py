@@ -114,11 +114,12 @@ def _largest(error: Floats, rooted: Floats, drawn: Floats) -> tuple[Ints, Floats
         )  # one product of matrices
         moved += error[part, :, None]
         moved *= moved
-        square = moved.sum(axis=1)
-        at = square.argmax(axis=0)
-        size = square[at, np.arange(count)]
-        motion = np.where(size > most, start + at, motion)
-        most = np.maximum(most, size)
+        square = moved[:, 0]
+        square += moved[:, 1]
+        square += moved[:, 2]
+        for number, size in enumerate(square, start):
+            motion[size > most] = number
+            np.maximum(most, size, out=most)
     return motion, np.sqrt(most)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from postproc.base.arrays import Bools, FewRows, Floats, Ints, frozen, is_shared, numbers
-from postproc.base.batches import blocks, in_blocks
+from postproc.base.batches import blocks, in_blocks, select_rows
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import lengths
 from postproc.base.units import DEG
@@ -121,7 +121,7 @@ class Wrenches:
     def largest_along(self, rows: Ints) -> Floats:
         """(K, 6) the wrench of the motions ``rows`` (K,) where their profile has its largest force; at the end of those
         without one."""
-        wrench = self.at_end[rows].copy()
+        wrench = select_rows(self.at_end, rows)
         if self.ramps is None or not self.ramps.inside.any():
             return wrench
         at, share, _ = self.ramps.only(self.ramps.inside).places()

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
-from postproc.base.batches import ROWS, in_blocks
+from postproc.base.batches import ROWS, in_spans, select_rows
 from postproc.base.document import Document, Edit, Edits
 from postproc.base.sanitize import sanitize
 from postproc.base.units import MM
@@ -129,21 +129,21 @@ def page_data(
         motions=n,
         off=int(np.count_nonzero(state == MotionOutcome.OFF)),
         rows=rows,
-        line=path.line[rows],
-        kind=path.kind[rows],
-        state=state[rows],
-        cut=cut[rows],
-        path_length=np.cumsum(np.where(scope, task.desired_path.length, 0.0))[rows] / MM,
+        line=select_rows(path.line, rows),
+        kind=select_rows(path.kind, rows),
+        state=select_rows(state, rows),
+        cut=select_rows(cut, rows),
+        path_length=select_rows(np.cumsum(np.where(scope, task.desired_path.length, 0.0)), rows) / MM,
         position=_by_blocks(lambda some: task.wanted[some].position, rows) / MM,
         arcs=arcs,
         arc_points=arc_points,
         force=task.force.largest_along(rows)[:, :3],
         force_word=_force_word(task),
-        deflection=result.deflection[rows] / MM,
+        deflection=select_rows(result.deflection, rows) / MM,
         correction=_by_blocks(lambda some: _correction(task, result, some), rows) / MM,
-        before=before[rows] / MM,
-        after=after[rows] / MM,
-        path_error=between[rows] / MM,
+        before=select_rows(before, rows) / MM,
+        after=select_rows(after, rows) / MM,
+        path_error=select_rows(between, rows) / MM,
         inserted=first[rows + 1] - first[rows] - 1,
         widths=np.where(scope[rows, None], _widths(report, rows), np.nan),
         evaluated=len(report.uncertainty.expanded),
@@ -157,7 +157,7 @@ def page_data(
 
 def _by_blocks(compute: Callable[[Ints], Floats], rows: Ints, each: int = 1) -> Floats:
     """(K each, 3) what ``compute`` returns for ``rows`` (K,)."""
-    parts = in_blocks(lambda block: compute(rows[block]), len(rows), ROWS // each)
+    parts = in_spans(lambda block: compute(rows[block]), rows, ROWS // each)
     return np.concatenate([np.empty((0, 3)), *parts])
 
 

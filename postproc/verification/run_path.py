@@ -102,12 +102,12 @@ class RunPath:
         """As ``_programmed``, of motions that turn the tool evenly."""
         path, (motions, own) = self.task.desired_path, _runs(rows)
         start, end = path.start[motions], path.end[motions]
-        turn = turn_between(start.rotation, end.rotation)
         part, way = share[:, None], end.position - start.position
         position = start.position.take(own, axis=0) + part * way.take(own, axis=0)
         rotation = start.rotation.take(own, axis=0)
-        turns = np.flatnonzero((lengths(turn) > _NO_TURN)[own])
+        turns = np.flatnonzero((path.angle[motions] > _NO_TURN)[own])
         if len(turns):
+            turn = turn_between(start.rotation, end.rotation)
             by = rotation_from_vector(part[turns] * turn[own[turns]])
             rotation[turns] = product(by, rotation[turns])
         return Poses(rotation, position)

@@ -132,9 +132,11 @@ class _Tracking:
         begin, end = min(self.places) - self.reach, max(self.places) + self.reach
         nodes = np.searchsorted(self.arc, [begin, end + REACH * self.step[block].sum()])
         low, high = min(max(int(nodes[0]) - 1, 0), self.last), min(int(nodes[1]), self.last)
-        value = command @ self.tangent[low : high + 2].T - self.level[low : high + 2]
+        value = command @ self.tangent[low : high + 2].T
+        value -= self.level[low : high + 2]
         is_behind = value < 0
-        row, interval = np.nonzero(~is_behind[:, :-1] & is_behind[:, 1:])
+        # of two dimensions at once it takes several times as long to look for what is true
+        row, interval = np.divmod(np.flatnonzero(is_behind[:, :-1] < is_behind[:, 1:]), high + 1 - low)
         one, two = value[row, interval], value[row, interval + 1]
         share, interval = one / (one - two), interval + low
         # before the start and after the end of the stretch these are the places

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
+from postproc.base.batches import blocks
 from postproc.base.document import Document
 from postproc.base.findings import Finding, Refusal, Topic, nearest
 from postproc.base.geometry import PoseRows, Poses
@@ -391,8 +392,9 @@ def _other_carrier(request: Request, path: Toolpath, force: Wrenches, external: 
 
 def _missing_orientation(request: Request, path: Toolpath, force: Wrenches, cell: Cell) -> None:
     """Refuse cuts of a program that states positions only, in a cell that does not state how the tool is oriented."""
-    lost = force.carries & ~path.constraints.orientation_programmed & np.isfinite(path.position).all(axis=1)
-    lost &= ~np.isfinite(path.rotation[:, 0, 0]) & ~path.keeps_orientation
+    lost = force.carries & ~path.constraints.orientation_programmed & ~path.keeps_orientation
+    for rows in blocks(len(path)) if lost.any() else ():
+        lost[rows] &= np.isfinite(path.position[rows]).all(axis=1) & ~np.isfinite(path.rotation[rows, 0, 0])
     if cell.orientation is not None:
         lost[[*path.constraints.refused]] = False  # rotary axes without a TCP mode: these motions alone
     if lost.any():

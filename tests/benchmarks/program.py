@@ -25,14 +25,18 @@ FITTED_FROM = 10_000
 EXPONENT = 1.05
 """Goal of the growth."""
 
-WALL = {1_000_000: 20.0, 100_000: 3.0}
-"""[s] Goals by the clock for whole runs, by size."""
+WALL = {
+    "krl": {100: 0.35, 1_000_000: 8.0},
+    "gcode": {100: 0.35, 1_000_000: 12.0},
+    "rapid": {1_000_000: 20.0},
+}
+"""[s] Goals by the clock for whole runs, by language and size."""
 
 MEMORY = {1_000_000: 800.0, 3_000_000: 1500.0, 10_000_000: 1500.0}
 """[MB] Goals."""
 
 SMALL, SMALL_WALL = 2000, 1.0
-HELP_WALL = 0.3
+HELP_WALL = 0.05
 TIMES = 5
 
 
@@ -46,7 +50,8 @@ def rows(language: str, sizes: list[int]) -> list[tuple[int, Cost]]:
         if found:
             before, less = found[-1]
             growth = f"{np.log(cost.cpu / less.cpu) / np.log(count / before):9.2f}"
-        wanted = [f"{WALL[count]:g} s"] if count in WALL else []
+        goal = WALL.get(language, {}).get(count)
+        wanted = [] if goal is None else [f"{goal:g} s"]
         wanted += [f"{MEMORY[count]:g} MB"] if count in MEMORY else []
         print(
             f"{language:6} {count:9d} {cost.wall:8.2f} {cost.cpu:8.2f} {1e6 * cost.cpu / count:12.1f}"

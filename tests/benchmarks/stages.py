@@ -7,8 +7,11 @@ has one.
 
 from __future__ import annotations
 
-import argparse
 import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is there
+
+import argparse
 import signal
 import sys
 import tempfile

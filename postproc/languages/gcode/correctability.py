@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.base.arrays import Bools, Ints
+from postproc.base.byte_search import occurrences
 from postproc.base.document import Document
 from postproc.languages.gcode.blocks import AXES, FRAMED, BlockWords, Reasons, What
 from postproc.languages.gcode.control import Feed, Group, Move, Once
@@ -331,7 +332,7 @@ def _through(built: Built, refused: Bools, building: Bools) -> Ints:
 
 def _reading(document: Document, execution: Execution) -> Ints:
     """Blocks with a variable that holds a position (#5001 to #5069, #5420 to #5428, #<_x>), or is itself computed."""
-    places = [found.start() for found in POSITION.finditer(document.raw)]
+    places = list(occurrences(POSITION, document.raw))
     starts, order = execution.text.blocks.start, execution.order
     blocks = np.unique(np.searchsorted(starts, places, side="right") - 1).astype(np.int64)
     return blocks if order is None else np.flatnonzero(np.isin(order, blocks))

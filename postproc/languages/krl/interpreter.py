@@ -9,6 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from postproc.base.byte_search import find_word, occurs
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
 from postproc.base.memory import without_garbage_collection
@@ -92,8 +93,8 @@ def read(
     others.share(surveyed, declarations.types.keys() - declarations.shared)
     surveyed.aliases = aliases(surveyed.handed, parameters_of(surveyed.routines))
     read = (*documents, *references, *siblings)
-    has_tcp = any(_TCP.search(document.raw) for document in read)
-    has_turning = any(_TURNING.search(document.raw) for document in read)
+    has_tcp = any(occurs(_TCP, document.raw) for document in read)
+    has_turning = any(occurs(_TURNING, document.raw) for document in read)
     unfollowed = Unfollowed(labels=_far_labels(surveyed))
     for reading in range(MOST_READINGS + 1):
         run = ExecutionContext(
@@ -104,7 +105,7 @@ def read(
             _variables(declarations, surveyed),
             has_tcp,
             has_turning,
-            any(_OVERRIDE.search(document.raw) for document in read),
+            any(occurs(_OVERRIDE, document.raw) for document in read),
             MotionRows(source),
             others,
             effects,
@@ -246,12 +247,12 @@ def _report_forms(run: ExecutionContext) -> None:
 
 def _marker(raw: bytes) -> Span | None:
     """The first line that is the comment of a compensated program."""
-    at = raw.find(_MARK)
+    at = find_word(raw, _MARK)
     while at >= 0:
         found = _MARKER.match(raw, raw.rfind(b"\n", 0, at) + 1)
         if found:
             return Span(0, *found.span(1))
-        at = raw.find(_MARK, raw.find(b"\n", at) + 1 or len(raw))
+        at = find_word(raw, _MARK, raw.find(b"\n", at) + 1 or len(raw))
     return None
 
 

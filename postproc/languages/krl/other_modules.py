@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
+from postproc.base.byte_search import occurs
 from postproc.base.document import Document
 from postproc.languages.krl.aliases import parameters_of
 from postproc.languages.krl.data import (
@@ -211,7 +212,7 @@ def _module(
     bind_symbols(declarations, symbols, own)
     code = list(scan(document, True))
     statements = ((i, one if isinstance(one, Statement) else _MOTION) for i, one in enumerate(code))
-    apart = _APART.search(document.raw) is not None
+    apart = occurs(_APART, document.raw)
     return OtherModule(document, code, program_structure(statements), declarations, apart)
 
 

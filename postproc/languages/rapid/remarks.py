@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from postproc.base.byte_search import find_word
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
 from postproc.languages.core.row_facts import SPEAKS
@@ -86,12 +87,12 @@ def _others(
 def find_marker(raw: bytes) -> Span | None:
     """The first line that is the comment of a compensated program."""
     mark = MARK.encode()
-    at = raw.find(mark)
+    at = find_word(raw, mark)
     while at >= 0:
         start = max(raw.rfind(b"\n", 0, at), raw.rfind(b"\r", 0, at)) + 1
         found = _MARKER.match(raw, start)
         if found:
             blank = len(found[0]) - len(found[0].lstrip(b" \t"))
             return Span(0, start + blank, found.end())
-        at = raw.find(mark, at + len(mark))
+        at = find_word(raw, mark, at + len(mark))
     return None
