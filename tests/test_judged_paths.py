@@ -244,9 +244,10 @@ def test_a_cut_that_ends_too_early_is_seen(tmp_path: Path) -> None:
 
 # The cases
 
-REPORTED = re.compile(r"pole BC \w+, lean 0|CIRC #CONSTANT|spline, SPL")
-"""Cases that are not within the tolerance, which the command reports: poles of B and C, tools that keep their
-orientation, and what a controller does between the points of a spline."""
+REPORTED = re.compile(r"pole BC \w+, lean 0|lead-in|CIRC #CONSTANT|steps of|spline, SPL")
+"""Cases that are not within the tolerance, which the command reports: corrections that change faster than motions of
+one interpolation cycle can follow, poles of B and C, tools that keep their orientation, and what a controller does
+between the points of a spline."""
 
 SLOW = re.compile(r"panel, forces x (0.5|2.5)|panel, tol|lean [1345679]$")
 """Cases that ``python -m tests.judge`` runs, and not the tests."""
@@ -269,7 +270,7 @@ def test_the_written_path(case: Case, tmp_path: Path) -> None:
 def test_verify_agrees_where_the_tool_may_be_at_two_places(tmp_path: Path) -> None:
     """The correction turns back at the corner, so that the path is square to the tool before and after it: the nearer
     of both counts, over all of the stretch on which there are two."""
-    outcome = run(Case("corners against the force", against_the_force(0.01)), tmp_path, verify=True)
+    outcome = run(Case("corners against the force", against_the_force(0.02)), tmp_path, verify=True)
     assert outcome.exit == 3
     assert outcome.verdict is not None
     assert outcome.verify == pytest.approx(outcome.verdict.after.largest / MM, abs=1e-3)
@@ -282,16 +283,9 @@ def test_verify_agrees_where_the_tool_may_be_at_two_places(tmp_path: Path) -> No
 def test_what_no_points_hold_is_followed_as_near_as_they_can(
     tmp_path: Path, build: Callable[[Path], Path], nearest: float, most: float
 ) -> None:
-    """Under a ramp that is stated to be short.  From an arc into a line to the right: 0.043 mm by the points of the
+    """From an arc into a line to the right: 0.043 mm by the points of the
     corner alone; where the force turns round: 0.036 mm.  No search found points that are nearer than ``nearest``."""
-
-    def stated(folder: Path) -> Path:
-        program = build(folder)
-        with (folder / "cell.yaml").open("a") as cell:
-            cell.write("force_ramp: 5\n")
-        return program
-
-    outcome = run(Case("stated", stated), tmp_path)
+    outcome = run(Case("followed", build), tmp_path)
     assert outcome.exit == 3
     assert outcome.verdict is not None
     assert nearest * MM < outcome.verdict.after.largest < most * MM

@@ -21,10 +21,8 @@ from postproc.base.batches import each_block
 from postproc.compensation.problem import CompensationProblem
 from postproc.process.force_ramps import Ramps
 
-ASSUMED, ASSUMED_TIME = 5e-3, 0.15
-"""[m] Length of a ramp where neither the cell nor the process states it or the cutter's radius, or what the feed
-covers in so many [s] where that is longer: arms swing at 5 to 10 Hz at their lowest, and it takes about a period until
-their deflection has followed a force."""
+ASSUMED = 5e-3
+"""[m] Length of a ramp where neither the cell nor the process states it or the cutter's radius."""
 
 SHORTEST = 1e-4
 """[m] A ramp is no shorter."""

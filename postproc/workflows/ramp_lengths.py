@@ -8,7 +8,7 @@ from postproc.base.arrays import Floats
 from postproc.base.units import MM
 from postproc.cell import Cell
 from postproc.compensation.problem import CompensationProblem
-from postproc.compensation.ramped_forces import ASSUMED, ASSUMED_TIME, EarlyShares
+from postproc.compensation.ramped_forces import ASSUMED, EarlyShares
 from postproc.process import Wrenches
 from postproc.toolpath import Toolpath
 
@@ -35,16 +35,11 @@ def ramp_lengths(cell: Cell, path: Toolpath, force: Wrenches) -> Floats:
         if tool is not None and tool.diameter is not None:
             radius[index] = 0.5 * tool.diameter
     if force.radius is None and np.isnan(radius).all():
-        return _assumed(path)
+        return np.broadcast_to(ASSUMED, (len(path),))
     ramp = radius[path.tool]
     if force.radius is not None:
         ramp = np.where(np.isnan(force.radius), ramp, force.radius)
-    return np.where(np.isnan(ramp), _assumed(path), ramp) if np.isnan(ramp).any() else ramp
-
-
-def _assumed(path: Toolpath) -> Floats:
-    """(N,) [m]"""
-    return np.fmax(ASSUMED, ASSUMED_TIME * path.feed)
+    return np.where(np.isnan(ramp), ASSUMED, ramp) if np.isnan(ramp).any() else ramp
 
 
 def early_shares(cell: Cell, task: CompensationProblem) -> EarlyShares | None:

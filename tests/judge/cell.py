@@ -11,8 +11,7 @@ import yaml
 from .motion import DEG, MM, from_abc
 
 Frame = tuple[np.ndarray, np.ndarray]
-DEFAULT_RAMP, DEFAULT_TIME = 5 * MM, 0.15
-"""[m] Path over which a force changes where nothing states it, or as far as the feed goes in so many [s]."""
+DEFAULT_RAMP = 5 * MM
 
 
 def frame(values: dict) -> Frame:
@@ -23,8 +22,8 @@ def frame(values: dict) -> Frame:
 
 @dataclass
 class Cell:
-    """Frames as (rotation, position); start (6,) [rad]; start_external (6,): E1 .. E6 [mm, deg]; tolerance [m],
-    tolerance_angle [rad]; ramp [m], None where nothing states it."""
+    """Frames as (rotation, position); start (6,) [rad]; start_external (6,): E1 .. E6 [mm, deg]; tolerance, ramp [m];
+    tolerance_angle [rad]."""
 
     robot: str
     robot_base: Frame
@@ -37,12 +36,8 @@ class Cell:
     orientation: np.ndarray
     tolerance: float
     tolerance_angle: float
-    ramp: float | None
+    ramp: float
     folder: Path
-
-    def ramp_at(self, feed: float) -> float:
-        """[m] where the motion after a vertex has the ``feed`` [m/s]."""
-        return max(DEFAULT_RAMP, DEFAULT_TIME * feed) if self.ramp is None else self.ramp
 
     @classmethod
     def load(cls, path: Path, ramp: float | None = None) -> Cell:
@@ -73,7 +68,7 @@ class Cell:
             orientation=from_abc(*(float(angles.get(k, 0.0)) for k in "abc")),
             tolerance=float(said.get("tolerance", 0.02)) * MM,
             tolerance_angle=float(said.get("tolerance_deg", 0.01)) * DEG,
-            ramp=stated * MM if stated is not None else ramp,
+            ramp=stated * MM if stated is not None else DEFAULT_RAMP if ramp is None else ramp,
             folder=path.parent,
         )
 

@@ -45,14 +45,13 @@ class Field:
         path: Path,
         low: int,
         high: int,
-        ramp: float | Callable[[float], float],
+        ramp: float,
         largest: float,
         rule: str = CENTRED,
         correct: Callable[[int, np.ndarray], np.ndarray] | None = None,
     ) -> None:
-        """``low``, ``high``: first and last motion; ramp: its length [m], or that by the feed [m/s] behind a vertex;
-        largest [N]: of the program; correct: by how much (3,) [m] a target is moved where a motion begins under a
-        wrench (6,), for the rule STRETCHED."""
+        """``low``, ``high``: first and last motion; largest [N]: of the program; correct: by how much (3,) [m]
+        a target is moved where a motion begins under a wrench (6,), for the rule STRETCHED."""
         self.path, self.low, self.high = path, low, high
         self.rows = np.arange(low, high + 1)
         motions = path.motions[low : high + 1]
@@ -67,21 +66,20 @@ class Field:
         self.begin, self.end = begin, end
         # ramps at the vertices that are left: their half, and the wrench in their middle
         step = np.flatnonzero(~smooth)
-        reaches = np.array([ramp(m.feed) if callable(ramp) else ramp for m in motions])
         self.after: list[tuple[float, float, np.ndarray]] = []
         if rule != CENTRED:
             for k in step:
-                reach, change = reaches[k + 1], begin[k + 1] - end[k]
+                reach, change = ramp, begin[k + 1] - end[k]
                 if rule == STRETCHED and correct is not None:
                     moved = correct(low + k + 1, end[k]) - correct(low + k + 1, begin[k + 1])
                     feed = path.tangent(np.array([low + k + 1]), np.zeros(1))[0]
-                    reach = max(reach, moved @ feed / STEEPEST)
+                    reach = max(ramp, moved @ feed / STEEPEST)
                 self.after.append((path.start[low + k + 1], reach, change))
             step = step[:0]
         lengths = path.length[self.rows]
         self.ramp = np.zeros((2, len(self.rows)))  # at the begin and at the end of each motion
-        self.ramp[0, step + 1] = np.minimum(reaches[step + 1] / 2, lengths[step + 1] / 2)
-        self.ramp[1, step] = np.minimum(reaches[step + 1] / 2, lengths[step] / 2)
+        self.ramp[0, step + 1] = np.minimum(ramp / 2, lengths[step + 1] / 2)
+        self.ramp[1, step] = np.minimum(ramp / 2, lengths[step] / 2)
         self.middle = np.zeros((2, len(self.rows), 6))
         self.middle[0, step + 1] = self.middle[1, step] = mean[step]
         self.steps = len(step)

@@ -63,7 +63,7 @@ def waiting(*between: str) -> Callable[[Path], Path]:
 
 def against_the_force(tolerance: float) -> Callable[[Path], Path]:
     """Corners to the right, where the force of the feed frame pushes the tool to the left: its correction turns back
-    as the path turns on, as fast as the shortest motions can follow within 0.02 mm, not within 0.01."""
+    as the path turns on, as fast as the shortest motions can follow within 0.05 mm, not within 0.02."""
     corners = [(0, 0), (100, 0), (100, -80)]
     return krl(
         f"LIN {pose(0, -60, 40)}", f"LIN {pose(0, -60, -5)}", CUT,

@@ -121,7 +121,7 @@ def judge(
         raise NotComparable(f"{len(cuts)} cuts before, {len(others)} after")
     largest = max((np.linalg.norm(m.force[0][:3]) for m in first.motions if not m.air), default=0.0)
     correct = _correction(first) if rule == STRETCHED else None
-    fields = [Field(first, low, high, cell.ramp_at, largest, rule, correct) for low, high in cuts]
+    fields = [Field(first, low, high, cell.ramp, largest, rule, correct) for low, high in cuts]
     before = _run(first, cuts, first, cuts, fields, step)
     after = _run(first, cuts, second, others, fields, step)
     return Verdict(before, after, cell, len(cuts), (len(first.motions), len(second.motions)))
