@@ -10,7 +10,7 @@ import numpy as np
 from postproc.base.arrays import Floats
 from postproc.diagnosis.alternatives import find_alternatives
 from postproc.diagnosis.candidate_fits import composed, in_scales, keys_of, point_without, with_effects
-from postproc.diagnosis.candidates import Candidate, candidates, is_visible
+from postproc.diagnosis.candidates import EVERY, Candidate, candidates, is_visible
 from postproc.diagnosis.nonlinear_effects import Outside, broyden_update, evaluate_at_size
 from postproc.diagnosis.search_result import Key, Linear, Search
 from postproc.diagnosis.selection import (
@@ -44,7 +44,8 @@ FORM = 0.01
 effect does beside its law looks like small ones."""
 
 EXACT = (JointOffset.name, LinkGeometry.name)
-"""Where axes lie is no law that could be inexact: however wrong a drawing was, what is small beside it counts."""
+"""Where axes lie is no law that could be inexact: however wrong a drawing was, what is small beside it counts.  A whole
+arm whose axes lie elsewhere is as usual as one axis, and no sum that happens to look like it."""
 
 MOST = 0.5
 """Share of what otherwise remains from which on a place of an axis counts beside however large a law: what that does
@@ -94,7 +95,8 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
             shown = list(linear.candidates)
         before = {c.key for c in chosen}
         start = [i for i, c in enumerate(linear.candidates) if c.key in before]
-        selection = selected(linear.problem, range(len(linear.candidates)), start)
+        sums = {i for i, c in enumerate(linear.candidates) if c.joint == EVERY and c.name not in EXACT}
+        selection = selected(linear.problem, range(len(linear.candidates)), start, sums)
         now = tuple(linear.candidates[g] for g in selection.groups)
         keys = frozenset(c.key for c in now)
         if keys == before or keys in tried or len(tried) >= PASSES:

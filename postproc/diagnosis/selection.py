@@ -6,7 +6,7 @@ targets, refitted parameters.  A group is in or out as a whole.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -239,18 +239,22 @@ def gain_by_chance(problem: Problem, rank: int, freedom: int, among: int) -> flo
 
 
 def selected(
-    problem: Problem, candidates: Sequence[int], start: Sequence[int] = (), limit: int = 12
+    problem: Problem,
+    candidates: Sequence[int],
+    start: Sequence[int] = (),
+    sums: Collection[int] = (),
+    limit: int = 12,
 ) -> Explained:
     """Groups taken in one by one from ``start`` on, the one with the best evidence first, exchanged and left out again
     as long as that is better.  A group stays if by chance, among all ``candidates``, its gain has a probability below
     ``CHANCE``.
 
-    A group of several columns that was the best by itself may be a sum of others: without it, and grown again from
-    what else was chosen, the choice may explain as much with fewer columns.
+    A group of ``sums`` that was the best by itself may be a sum of others: without it, and grown again from what else
+    was chosen, the choice may explain as much with fewer columns.
     """
     now = _grown(problem, explained(problem, start), candidates, candidates, limit)
     for gone in now.groups:
-        if gone not in now.groups or len(problem.places[gone]) < 2:
+        if gone not in now.groups or gone not in sums:
             continue
         rest, others = [g for g in now.groups if g != gone], [g for g in candidates if g != gone]
         instead = _grown(problem, explained(problem, rest), others, candidates, limit)
