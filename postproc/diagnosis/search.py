@@ -111,6 +111,9 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
             if keys in tried:
                 return done
         tried.add(keys)
+        # a fit that is over says nothing of the parameters in the next one
+        as_started = {c.key: c for c in shown}
+        now = tuple(as_started[c.key] if c.only else c for c in now)
         chosen, fitted = _confirmed(campaign, base, now, shown)
         weights = limit_shared_scatter(base, fitted)
 
