@@ -129,6 +129,7 @@ def test_a_small_program_loads_what_it_needs(tmp_path):
         "postproc.cli.completion",
     }
     assert not {name for name in loaded if name.startswith("postproc.languages.gcode.")} - {
+        "postproc.languages.gcode.cell_options",
         "postproc.languages.gcode.codes",
         "postproc.languages.gcode.detection",
     }

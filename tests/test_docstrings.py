@@ -57,7 +57,11 @@ def is_array(annotation: ast.expr | None) -> bool:
         annotation = ast.parse(annotation.value, mode="eval").body
     if annotation is None:
         return False
-    if isinstance(annotation, ast.Subscript) and ast.unparse(annotation.value) in ("Callable", "Iterator"):
+    if isinstance(annotation, ast.Subscript) and ast.unparse(annotation.value) in (
+        "Callable",
+        "Iterator",
+        "Literal",
+    ):
         return ast.unparse(annotation.value) == "Iterator" and is_array(annotation.slice)
     if isinstance(annotation, ast.Name | ast.Attribute):
         return ast.unparse(annotation).rpartition(".")[2] in ARRAYS

@@ -141,6 +141,7 @@ def test_a_repeated_path_has_the_forces_of_the_path(seed, count, spec):
     path = some_path(np.random.default_rng(seed), count)
     if not spec:
         notes = (
+            (0, "FORCE OFF"),  # also where the path begins again
             (1, "FORCE 100 20 30 @feed"),
             (4, "FORCE 0 60 10 @tool"),
             (7, "FORCE OFF"),

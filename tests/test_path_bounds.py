@@ -10,7 +10,7 @@ import pytest
 from judge.cases import CASES, DEG, Case, run
 from judge.cell import Cell
 from judge.force import Field
-from judge.judge import Tools, _cuts, _samples
+from judge.judge import Tools, cuts_of, sample_labels
 from judge.motion import MM
 from judge.path import Path as Way
 from judge.reader import read
@@ -27,10 +27,10 @@ class Cut:
     def __init__(self, program: Path, step: float = 2.0 * MM) -> None:
         cell = Cell.load(program.parent / "cell.yaml")
         self.way = Way(read(program, cell), Robot.find(cell.robot, cell.folder), cell)
-        ((self.low, self.high),) = _cuts(self.way.motions)
+        ((self.low, self.high),) = cuts_of(self.way.motions)
         self.rows = (self.low, self.high)
         self.nodes = self.way.joints_at_nodes()
-        self.label = _samples(self.way, *self.rows, step)
+        self.label = sample_labels(self.way, *self.rows, step)
         self.motion, self.share = self.way.find(self.label, *self.rows)
         largest = max(np.linalg.norm(m.force[0][:3]) for m in self.way.motions if not m.air)
         self.force = Field(self.way, *self.rows, cell.ramp, largest).at(self.label)

@@ -48,7 +48,8 @@ def closest_points(
     curve: Curves, parameter: Floats, reach: Floats, shortest: Floats, enough: float, vertex: int
 ) -> tuple[Floats, float]:
     """As ``fit_points``, of one curve: points (1, K, 3) [m] from where they have the ``parameter`` (1, K) [m] on, and
-    their largest distance [m] from it, inf where they have no room."""
+    their largest distance [m] from it, inf where they have no room; ``reach`` (1, K) and ``shortest`` (1, K - 1) [m] as
+    there."""
     points = moved_apart(curve.at(parameter)[0], shortest)
     best = evaluate_polygons(curve, points, reach, None, parameter, vertex)
     if not long_enough(points, shortest)[0]:

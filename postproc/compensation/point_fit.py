@@ -186,8 +186,8 @@ def long_enough(points: Floats, shortest: Floats) -> Bools:
 
 
 def moved_apart(points: Floats, shortest: Floats) -> Floats:
-    """The points (G, K, 3) with the inner ones moved so far apart that lines are ``shortest`` (G, K - 1) [m] or longer;
-    some are shorter still where there is no room."""
+    """Points (G, K, 3), ``points`` (G, K, 3) with the inner ones moved so far apart that lines are ``shortest``
+    (G, K - 1) [m] or longer; some are shorter still where there is no room."""
     inner = np.ones(points.shape[1])
     inner[[0, -1]] = 0.0
     share = inner[1:] / np.maximum(inner[1:] + inner[:-1], 1.0)
@@ -228,7 +228,7 @@ def evaluate_polygons(
     curves: Curves, points: Floats, reach: Floats, near: Floats | None, label: Floats, vertex: int
 ) -> Polygons:
     """The polygons (G, K, 3) against their curves; the nearest places are looked for from ``near`` (G, S), or from
-    where the points have the parameters ``label`` (G, K)."""
+    where the points have the parameters ``label`` (G, K); ``reach`` (G, K) [m] as of ``fit_points``."""
     label = _labels(curves, points, label, vertex)
     weights, slope, bend = _weights(curves, points, reach, label, vertex)
     place = weights @ points + bend

@@ -42,7 +42,7 @@ class FittedRamps:
 
 @dataclass(frozen=True)
 class FittedPoints:
-    """Points of one ramp: places (n, 3), path lengths (n,) [m] from the vertex, which of them is the motion that is
+    """Points of one ramp: ``place`` (n, 3) [m], path lengths ``along`` (n,) [m] from the vertex, which of them is the motion that is
     there already, and the largest error [m]."""
 
     place: Floats

@@ -56,7 +56,7 @@ def check_by_hand(
         raise _wrong(table, line, message, "check the point with the largest deviation")
     if np.any((deviation[near] > 0) != (word == SIGNS[0])):
         other = SIGNS[1] if word == SIGNS[0] else SIGNS[0]
-        message = f"# checked: says {word} where DEV says {other} by `# positive:`"
+        message = f"`# checked:` states {word} where DEV shows {other} by `# positive:`"
         help = "one of the two lines is wrong: look at that place of the part again, then at the measuring report"
         raise _wrong(table, line, message, help)
     return True

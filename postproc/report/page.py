@@ -247,6 +247,10 @@ _STATES = {
 
 def _column(values: np.ndarray, form: str) -> dict[str, object]:
     """Numbers as base64 of little-endian bytes, row by row."""
+    if form.startswith("f"):
+        values = np.where(
+            np.isnan(values), np.nan, values
+        )  # the sign of none depends on how many rows went together
     raw = np.ascontiguousarray(values, dtype=f"<{form}").tobytes()
     wide = values.shape[1] if values.ndim > 1 else 1
     return {"form": form, "wide": wide, "base64": base64.b64encode(raw).decode("ascii")}

@@ -115,8 +115,8 @@ def judge(
     cell = Cell.load(cell_file, ramp)
     robot = Robot.find(cell.robot, cell.folder)
     first, second = (Path(read(file, cell), robot, cell) for file in (original, output))
-    cuts = _cuts(first.motions)
-    others = _cuts(second.motions)
+    cuts = cuts_of(first.motions)
+    others = cuts_of(second.motions)
     if len(cuts) != len(others):
         raise NotComparable(f"{len(cuts)} cuts before, {len(others)} after")
     largest = max((np.linalg.norm(m.force[0][:3]) for m in first.motions if not m.air), default=0.0)
@@ -151,7 +151,7 @@ def _correction(path: Path) -> Callable[[int, np.ndarray], np.ndarray]:
     return correct
 
 
-def _cuts(motions: list[Motion]) -> list[tuple[int, int]]:
+def cuts_of(motions: list[Motion]) -> list[tuple[int, int]]:
     """First and last motion of each run of motions under force."""
     air = np.array([True, *(m.air for m in motions), True])
     first = np.flatnonzero(air[:-1] & ~air[1:])
@@ -190,7 +190,7 @@ def _stops(path: Path, low: int, high: int) -> int:
     return sum(m.approximation == 0.0 for m in path.motions[low:high])
 
 
-def _samples(path: Path, low: int, high: int, step: float) -> np.ndarray:
+def sample_labels(path: Path, low: int, high: int, step: float) -> np.ndarray:
     """Labels along a cut: each motion and each approximated vertex in even steps, so small that the path is nowhere
     farther than ``SAGITTA`` from the line through them."""
     some = []
@@ -212,7 +212,7 @@ def _samples(path: Path, low: int, high: int, step: float) -> np.ndarray:
 
 
 def _along(wanted: Path, cut: tuple, path: Path, rows: tuple, one: Field, nodes: tuple, step: float) -> dict:
-    label = _samples(path, *rows, step)
+    label = sample_labels(path, *rows, step)
     tools = Tools(path, rows, label, nodes)
     place, lost = find_places(wanted, cut, one, label, tools)
     for _ in range(ROUNDS):
@@ -287,7 +287,7 @@ def _missed(wanted: Path, cut: tuple, place: np.ndarray, there: np.ndarray) -> f
     """[m] the largest distance of a place of the cut's path from the line of the tool's places: of those beside where
     it is passed, and of the nearest one, if it is no farther along the path than ``PASSED``."""
     ends = wanted.start[cut[0]], wanted.start[cut[1] + 1]
-    label = np.unique(np.concatenate([_samples(wanted, *cut, STEP), np.asarray(ends)]))
+    label = np.unique(np.concatenate([sample_labels(wanted, *cut, STEP), np.asarray(ends)]))
     points = wanted.points(label, *cut)
     near = np.searchsorted(np.maximum.accumulate(place), label)
     nearest = cKDTree(there).query(points)[1]
