@@ -42,8 +42,8 @@ class FittedRamps:
 
 @dataclass(frozen=True)
 class FittedPoints:
-    """Points of one ramp: ``place`` (n, 3) [m], path lengths ``along`` (n,) [m] from the vertex, which of them is the motion that is
-    there already, and the largest error [m]."""
+    """Points of one ramp: ``place`` (n, 3) [m], path lengths ``along`` (n,) [m] from the vertex, which of them is the
+    motion that is there already, and the largest error [m]."""
 
     place: Floats
     along: Floats
