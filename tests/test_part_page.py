@@ -13,7 +13,9 @@ import pytest
 pytest.importorskip("numba")
 
 from postproc.base.geometry import Poses
+from postproc.report import page as page_module
 from postproc.report.page import FOLDER
+from postproc.report.part_page import part_data
 from postproc.report.part_scene import robot_chain
 from postproc.robot.chain import Chain
 from postproc.robot.description import load_robot
@@ -26,12 +28,26 @@ SAMPLE = "samples/kr270_stock"
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory, pytestconfig):
+def made(tmp_path_factory, pytestconfig):
+    """The page, the report, and the part that the page is drawn from."""
     folder = tmp_path_factory.mktemp("page")
     shutil.copytree(pytestconfig.rootpath / "robots", folder / "robots")
     shutil.copytree(pytestconfig.rootpath / SAMPLE, folder / SAMPLE)
-    report = compensate(Request(folder / SAMPLE / "part.ngc", force=""))
-    return folder / SAMPLE / "compensated" / "part.report.html", report
+    parts = []
+
+    def kept(part, scene):
+        parts.append(part)
+        return part_data(part, scene)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(page_module, "part_data", kept)
+        report = compensate(Request(folder / SAMPLE / "part.ngc", force=""))
+    return folder / SAMPLE / "compensated" / "part.report.html", report, parts[-1]
+
+
+@pytest.fixture(scope="module")
+def page(made):
+    return made[:2]
 
 
 def numbers(data, name, form):
@@ -71,8 +87,8 @@ def test_the_drawn_chain_is_that_of_the_robot(name, pytestconfig):
 
 
 @pytest.mark.slow
-def test_what_the_script_draws_is_what_the_report_says(page):
-    path, report = page
+def test_what_the_script_draws_is_what_the_report_says(made):
+    path, report, drawn_from = made
     text = path.read_text(encoding="utf-8")
     assert len(text) < 10e6
     data = drawn(path)
@@ -88,16 +104,30 @@ def test_what_the_script_draws_is_what_the_report_says(page):
     after = errors[errors[:, 1] > -32768, 1] / 32767 * data["range"]
     for found, key in ((after.max(), "excess_max"), (-after.min(), "gouge_max")):
         assert found == pytest.approx(min(part["after"][key], 0.99 * data["range"]), abs=1e-5)
-    # beyond the tolerance before: most of what the program makes, and nothing else
-    # by area: a third of each triangle for each of its corners
-    triangles = faces.reshape(-1, 3)
-    sides = np.diff((places / 65535 * data["extent"])[triangles], axis=1)
-    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    weight = np.bincount(triangles.ravel(), np.repeat(area, 3), len(places))
-    known = errors[:, 0] > -32768
-    beyond = np.abs(errors[:, 0] / 32767 * data["range"]) > data["tolerance"]
-    share = (weight * beyond)[known].sum() / weight[known].sum()
-    assert share == pytest.approx(part["before"]["out_of_tolerance"], abs=0.05)
+    # each vertex has the largest error of the points around it, and those are the points that the report counts
+    surface, own = drawn_from.surface, drawn_from.own
+    around, area = surface.vertex[own], surface.area[own]
+    tolerance = drawn_from.figures.tolerance
+    for column, name in enumerate(("before", "after")):
+        size = np.abs(getattr(drawn_from, name).error)
+        share = area[size > tolerance].sum() / area.sum()
+        assert share == pytest.approx(part[name]["out_of_tolerance"], abs=1e-6)
+        largest = np.full(len(places), -1.0)
+        np.maximum.at(largest, around.ravel(), np.repeat(size, 4))
+        seen = errors[:, column]
+        np.testing.assert_array_equal(seen > -32768, largest >= 0)
+        known = largest >= 0
+        wanted = np.minimum(largest[known] * 1000, 0.99 * data["range"])
+        np.testing.assert_allclose(np.abs(seen[known]) / 32767 * data["range"], wanted, atol=2e-6)
+        # a spot beyond the tolerance is drawn so at all its corners: no less is drawn than the report counts
+        off = np.abs(seen) / 32767 * data["range"] > data["tolerance"]
+        off &= seen > -32768
+        clear = np.abs(size - tolerance) > 2e-9  # of the steps in which the errors are drawn
+        assert np.all(off[around][(size > tolerance) & clear])
+        touched = np.bincount(around[(size > tolerance) | ~clear].ravel(), minlength=len(places)) > 0
+        assert not np.any(off & ~touched)
+    # which the page says, because narrow strips within the tolerance between others do not show
+    assert f"the largest error of the points around it, which are {part['spacing']:.2g} mm apart" in text
     for side in ("before", "after"):
         assert f"{part[side]['gouge_max']:.4f}" in text
 

@@ -49,6 +49,7 @@ def part_section(part: PartError, uncertainty: Uncertainty, yaw: float) -> dict[
         "high": HIGH,
         "key": _png(np.repeat(np.repeat(BANDS[None], 32, axis=1), 14, axis=0)),
         "tolerance": f"{figures.tolerance / MM:g}",
+        "spacing": f"{figures.spacing / MM:.2g}",
         "rows": list(_rows(figures)),
     }
 
