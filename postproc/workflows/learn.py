@@ -218,7 +218,7 @@ def _check_parts(parts: Sequence[MeasuredPart], positive: str) -> None:
             message = f"{part.file.name} has the same content as {other.file.name}"
             raise Refusal(Finding("LRN001", message, str(part.file), help="name each part once"))
         if positive and positive != part.sign:
-            message = f"the file says that a positive DEV is {part.sign}, the command that it is {positive}"
+            message = f"the file states that a positive DEV is {part.sign}, the command that it is {positive}"
             help = "one of them is wrong: look at a place of the part with a large deviation again"
             raise Refusal(Finding("LRN001", message, str(part.file), help=help))
 
