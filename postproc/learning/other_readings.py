@@ -34,7 +34,7 @@ from postproc.learning.plausible import EXCHANGED, LIKELIER, wrong_program, wron
 from postproc.learning.promise import aligned, alignment_basis
 
 EVEN = 2.0
-"""Odds below it are told as even."""
+"""Odds below it are reported as even."""
 
 HOPELESS = 100.0
 """Logarithm: a reading that is so much less likely by the known causes gets no effects of its own."""
