@@ -38,7 +38,7 @@ def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate]) -> 
     additional = [
         replace(u, value=start.get(u.key, u.value)) if u.prior is None else u for u in with_gauge(unknowns)
     ]
-    fitted = fit(campaign, model.with_values(start), [*own, *additional], nuisances=base.point.nuisances)
+    fitted = fit(campaign, model.with_values(start), [*own, *additional], nuisances=base.point.nuisances, factor=base.factor)
     if not any(candidate.effect.by_direction for candidate in chosen):
         return fitted
     return put_back(campaign, fitted, {u.key for u in own})

@@ -152,7 +152,8 @@ def fit(
     _enough(campaign, weights, unknowns)
     point = _influential(campaign, point, unknowns)
     start_point = point
-    steps, close = (NEAR_STEPS, NEAR) if near else (MAX_STEPS, CLOSE)
+    # while weights and unknowns still change a fit need not be exact
+    steps, close, last = NEAR_STEPS if near else MAX_STEPS, NEAR, near
     free, dropped = list(unknowns), list[Dropped]()
     again = PRIOR_ROUNDS if any(u.prior is not None for u in unknowns) else 0
     while True:
@@ -176,7 +177,10 @@ def fit(
             continue
         analysis = _insight(campaign, point, free, weights, factor)
         if not analysis.dropped:
-            break
+            if last:
+                break
+            close, last = CLOSE, True
+            continue
         dropped += analysis.dropped
         gone = [free[i] for i in range(len(free)) if i not in analysis.observable]
         free = [free[i] for i in analysis.observable]

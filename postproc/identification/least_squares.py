@@ -225,6 +225,14 @@ def descended(
         for _ in range(1 if ending else 12):
             moved = _stepped(campaign, point, unknowns, share * whole, scale)
             after, gone = residuals(moved)
+            astray = residual - share * (matrix @ whole) - after
+            if not ending and np.linalg.norm(astray) > CURVED * share * np.linalg.norm(matrix @ whole):
+                # back to the floor of the valley, which was curved: columns of the point serve once more
+                back = bounded_step(system, -astray if not keep_columns else np.concatenate([rotation.T @ -astray[: len(whitened)], -astray[len(whitened) :]]), *reach(campaign, moved, unknowns), len(scale), careful)
+                other = _stepped(campaign, moved, unknowns, back, scale)
+                its, lacks = residuals(other)
+                if lacks <= gone and its @ its < after @ after:
+                    moved, after, gone = other, its, lacks
             if gone <= lost and after @ after <= residual @ residual * (1 + 1e-12):
                 break
             share *= 0.5
