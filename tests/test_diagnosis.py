@@ -15,6 +15,7 @@ from measured import MARKERS, on_markers, plan, robot
 
 from postproc.base.geometry import Poses
 from postproc.diagnosis import verdict
+from postproc.diagnosis.candidate_fits import ChoiceFits
 from postproc.diagnosis.candidates import candidates, fewest_parameters, is_visible
 from postproc.diagnosis.decoys import AlternativeForm, decoys
 from postproc.diagnosis.diagnosis import diagnose
@@ -214,7 +215,7 @@ def test_hardware_of_the_file_is_doubted_only_where_something_else_explains_more
     spring = StiffnessModel.from_robot(robot("kuka_kr270"))
     campaign = campaign_of(spring, 30, loads=(1200.0, 2600.0))
     plain = StiffnessModel.from_robot(load_robot(SAMPLES / "kr270_missing_compensator" / "kr270_plain.yaml"))
-    found = search(campaign, fitted(campaign, plain))
+    found = search(ChoiceFits(campaign, fitted(campaign, plain)))
     (group,) = found.explained.groups
     foil = next(rival for rival in found.rivals if rival.is_decoy)
 
@@ -360,7 +361,7 @@ def test_a_few_poses_do_not_foretell_a_campaign():
     """Of two sessions of which one is most of all, only the other is left out."""
     spring = StiffnessModel.from_robot(robot("kuka_kr270"))
     campaign = campaign_of(spring, 24, loads=(1200.0, 2600.0))
-    found = search(campaign, fitted(campaign))
+    found = search(ChoiceFits(campaign, fitted(campaign)))
     (group,) = found.explained.groups
     rows = np.arange(len(campaign))
     small = held_out_gain(found, found.explained, group, (rows >= len(rows) - 18).astype(np.int64))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.base.arrays import Floats
-from postproc.diagnosis.candidate_fits import composed, point_without, with_effects
+from postproc.diagnosis.candidate_fits import ChoiceFits, composed, point_without
 from postproc.diagnosis.candidates import EVERY, Candidate, fewest_parameters
 from postproc.diagnosis.decoys import decoys
 from postproc.diagnosis.nonlinear_effects import evaluate_at_size
@@ -58,10 +58,11 @@ def squares_of(fitted: Fit, weights: Weighting, variance: float) -> float:
 
 
 def find_alternatives(
-    campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Explained
+    fits: ChoiceFits, fitted: Fit, linear: Linear, last: Explained
 ) -> tuple[Alternative, ...]:
     """Other candidates in the place of each choice that explain at least half of what it does, nearest first; the
     nearest are fitted: what is linear is only nearly so."""
+    campaign, base = fits.campaign, fits.base
     given, chosen = linear.problem, [linear.candidates[g] for g in last.groups]
     variance = scatter(given, last)
     here = squares_of(fitted, fitted.weights, variance)
@@ -103,9 +104,7 @@ def find_alternatives(
         of_mine.sort(key=lambda alternative: (not alternative.twin, alternative.margin))
         for k, alternative in enumerate(of_mine[:RIVALS]):
             if alternative.margin < max(CLOSE, CLOSE_SHARE * gain / variance):
-                there = with_effects(
-                    campaign, base, [alternative.candidate if c is mine else c for c in chosen]
-                )
+                there = fits.of([alternative.candidate if c is mine else c for c in chosen], exact=False)
                 worse = float(squares_of(there, fitted.weights, variance) - here) / variance
                 of_mine[k] = replace(alternative, worse=worse, fitted=True)
         alternatives += of_mine

@@ -94,7 +94,11 @@ def _may_explain(campaign: Campaign, done: Diagnosis) -> bool:
         return False
     more = basis_of(outside(basis, np.concatenate(columns, axis=1)))
     residual = outside(basis, weights(fitted.point.residual)[:, None])[:, 0]
-    return float(((more.T @ residual) ** 2).sum()) > WORTH_TRYING * float(residual @ residual)
+    remaining = 1.0 - float(((more.T @ residual) ** 2).sum()) / max(float(residual @ residual), 1e-300)
+    # of few readings that many columns explain a part by chance
+    freedom = weights.counts - basis.shape[1]
+    remaining *= freedom / max(1, freedom - more.shape[1])
+    return remaining < 1.0 - WORTH_TRYING
 
 
 def _finding(file: str, words: str) -> Finding:
@@ -131,16 +135,19 @@ def _shown(done: Diagnosis) -> list[tuple[int, Floats]]:
     visit = _visits(campaign.pose)
     residual = np.nan_to_num(fitted.point.residual[:, :3])
     names = [joint.name for joint in fitted.model.robot.joints]
+    squares, coordinates = float((weight * residual**2).sum()), int((weight > 0).sum())
     entries = []
     for variable, _, turn, _ in patterns(fitted, campaign):
         if turn is None or not variable.endswith("over its angle"):
             continue
         along = np.bincount(visit, (weight * turn * residual).sum(axis=1))
         size = np.bincount(visit, (weight * turn * turn).sum(axis=1))
-        gain = np.abs(along).sum() ** 2 / max(float(size.sum()), 1e-300) - BIT * len(along)
-        entries.append(
-            (float(gain), names.index(variable.split(" over ")[0]), -above * np.sign(along)[visit])
-        )
+        taken = float(np.abs(along).sum()) ** 2 / max(float(size.sum()), 1e-300)
+        rest = max(squares - taken, 1e-12 * squares)
+        # of any residual free sides take a part: what remains is the scatter that this counts in
+        gain = coordinates * np.log(max(squares, 1e-300) / max(rest, 1e-300)) - BIT * len(along)
+        if rest < SMALLER**2 * squares:
+            entries.append((gain, names.index(variable.split(" over ")[0]), -above * np.sign(along)[visit]))
     entries.sort(key=lambda entry: -entry[0])
     return [(joint, sides) for gain, joint, sides in entries[:JOINTS] if gain > 0]
 

@@ -27,8 +27,11 @@ def in_scales(fitted: Fit, unknowns: Sequence[Unknown]) -> Floats:
     return np.asarray((fitted.point.values(unknowns) - nulls) / scales(unknowns))
 
 
-def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate]) -> Fit:
-    """The non-linear fit with the effects ``chosen`` added to ``base``, its own unknowns fitted along."""
+def with_effects(
+    campaign: Campaign, base: Fit, chosen: Sequence[Candidate], exact: bool = True
+) -> Fit:
+    """The non-linear fit with the effects ``chosen`` added to ``base``, its own unknowns fitted along; ``exact`` as of
+    ``fit``."""
     model, unknowns = composed(base.model, chosen)
     start: dict[tuple[int, str], float] = {}
     for candidate in chosen:
@@ -38,10 +41,30 @@ def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate]) -> 
     additional = [
         replace(u, value=start.get(u.key, u.value)) if u.prior is None else u for u in with_gauge(unknowns)
     ]
-    fitted = fit(campaign, model.with_values(start), [*own, *additional], nuisances=base.point.nuisances, factor=base.factor)
+    fitted = fit(campaign, model.with_values(start), [*own, *additional], nuisances=base.point.nuisances, factor=base.factor, exact=exact)
     if not any(candidate.effect.by_direction for candidate in chosen):
         return fitted
     return put_back(campaign, fitted, {u.key for u in own})
+
+
+class ChoiceFits:
+    """Fits of choices of effects beside ``base``, each done once: a search that is done again without a candidate comes
+    by the same choices again."""
+
+    def __init__(self, campaign: Campaign, base: Fit) -> None:
+        self.campaign, self.base = campaign, base
+        self._done: dict[tuple[frozenset[object], bool], Fit] = {}
+
+    def of(self, chosen: Sequence[Candidate], exact: bool = True) -> Fit:
+        """``with_effects`` of ``chosen``; ``base`` of none.  Where only squares are compared it need not be ``exact``."""
+        if not chosen:
+            return self.base
+        key = frozenset((c.key, tuple(u.parameter.name for u in c.unknowns), c.start) for c in chosen)
+        if (key, True) in self._done:
+            return self._done[key, True]
+        if (key, exact) not in self._done:
+            self._done[key, exact] = with_effects(self.campaign, self.base, chosen, exact)
+        return self._done[key, exact]
 
 
 def put_back(campaign: Campaign, fitted: Fit, own: Set[tuple[int, str]]) -> Fit:

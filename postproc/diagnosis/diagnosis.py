@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.base.findings import Finding, Refusal
 from postproc.diagnosis.agreement import AGREES, largest_disagreement, without_effects
-from postproc.diagnosis.candidate_fits import with_effects
+from postproc.diagnosis.candidate_fits import ChoiceFits, with_effects
 from postproc.diagnosis.candidates import EVERY, Candidate
 from postproc.diagnosis.equivalent_models import cover_equivalent_models
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
@@ -79,14 +79,15 @@ def diagnose(
     sample = sample_of(campaign)
     base = fit(sample, model, own, nuisances=stated.point.nuisances)
     stage("looking for what is missing")
-    result = search(sample, base)
+    fits = ChoiceFits(sample, base)
+    result = search(fits)
     verdict = judge(result)
     rejected = list(verdict.rejected)
     for _ in range(AGAIN):
         # of what has no form that is known others would only be imitations
         if not verdict.rejected or any(why == OTHER_COURSE for _, why in verdict.rejected):
             break
-        result = search(sample, base, _banned(rejected))
+        result = search(fits, _banned(rejected))
         verdict = judge(result)
         rejected += verdict.rejected
     if sample is not campaign:

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.base.arrays import Floats
 from postproc.diagnosis.alternatives import find_alternatives
-from postproc.diagnosis.candidate_fits import composed, in_scales, keys_of, point_without, with_effects
+from postproc.diagnosis.candidate_fits import ChoiceFits, composed, in_scales, keys_of, point_without
 from postproc.diagnosis.candidates import EVERY, Candidate, candidates, is_visible
 from postproc.diagnosis.nonlinear_effects import Outside, broyden_update, evaluate_at_size
 from postproc.diagnosis.search_result import Key, Linear, Search
@@ -76,9 +76,10 @@ def model_unknowns(model: StiffnessModel) -> tuple[Unknown, ...]:
     return with_gauge(unknowns)
 
 
-def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
-    """Chooses among all effects of the library those that the readings ask for, beyond ``base``: the model of the robot
-    file with its own parameters refitted.  ``banned``: candidates that were found not to hold."""
+def search(fits: ChoiceFits, banned: Sequence[Key] = ()) -> Search:
+    """Chooses among all effects of the library those that the readings ask for, beyond the base of ``fits``: the model
+    of the robot file with its own parameters refitted.  ``banned``: candidates that were found not to hold."""
+    campaign, base = fits.campaign, fits.base
     chosen: tuple[Candidate, ...] = ()
     fitted = base
     tried: set[frozenset[Key]] = set()
@@ -101,7 +102,7 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
         keys = frozenset(c.key for c in now)
         if keys == before or keys in tried or len(tried) >= PASSES:
             last = explained(linear.problem, start)
-            against = find_alternatives(campaign, base, fitted, linear, last)
+            against = find_alternatives(fits, fitted, linear, last)
             better = next((r for r in against if r.fitted and not r.is_decoy and r.priced < -1.0), None)
             done = Search(base, fitted, chosen, hidden, linear, last, against)
             if better is None or len(tried) >= PASSES:
@@ -114,7 +115,7 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
         # a fit that is over says nothing of the parameters in the next one
         as_started = {c.key: c for c in shown}
         now = tuple(as_started[c.key] if c.only else c for c in now)
-        chosen, fitted = _confirmed(campaign, base, now, shown)
+        chosen, fitted = _confirmed(fits, now, shown)
         weights = limit_shared_scatter(base, fitted)
 
 
@@ -150,11 +151,12 @@ def drop_confounded(
 
 
 def _confirmed(
-    campaign: Campaign, base: Fit, chosen: tuple[Candidate, ...], shown: Sequence[Candidate]
+    fits: ChoiceFits, chosen: tuple[Candidate, ...], shown: Sequence[Candidate]
 ) -> tuple[tuple[Candidate, ...], Fit]:
     """Those of ``chosen`` that count as well where what readings of a pose share is taken from a fit without them, and
     that are not small beside others; the weakest first.  And the fit with them."""
-    fitted, among = with_effects(campaign, base, chosen) if chosen else base, len(shown)
+    campaign, base = fits.campaign, fits.base
+    fitted, among = fits.of(chosen), len(shown)
     while chosen:
         linear = _linear(campaign, base, limit_shared_scatter(base, base), fitted, chosen, chosen)
         places = range(len(chosen))
@@ -169,14 +171,14 @@ def _confirmed(
         ]
         weakest = min(small or places, key=lambda k: gains[k])
         rest = tuple(c for k, c in enumerate(chosen) if k != weakest)
-        fit_of_rest = with_effects(campaign, base, rest) if rest else base
+        fit_of_rest = fits.of(rest, exact=False)
         weights = limit_shared_scatter(base, fit_of_rest)
         given = _linear(campaign, base, weights, fitted, chosen, chosen).problem
         others = [g for g in places if g != weakest]
         if not small and counts(given, explained(given, others), explained(given, places), among):
             break
         chosen, fitted = rest, fit_of_rest
-    return chosen, fitted
+    return chosen, fits.of(chosen)
 
 
 def limit_shared_scatter(base: Fit, fitted: Fit) -> Weighting:

@@ -124,6 +124,7 @@ def fit(
     nuisances: Nuisances | None = None,
     near: bool = False,
     factor: float = 1.0,
+    exact: bool = True,
 ) -> Fit:
     """The weighted least squares of the readings ``rows`` (R,) (all without it) over the unknowns and nuisances.
 
@@ -132,6 +133,7 @@ def fit(
     stated, they are as wide as the residuals ask for.  ``robust``: readings far off are weighed down (Huber).
     ``nuisances``: tracker and targets to start with, where they are about known; ``near``: so is the model, the columns
     at which serve all through.  ``factor``: about the variance of the readings over the assumed one, to start with.
+    Where it need not be ``exact`` the last step may be one of ``NEAR``: squares are right to a thousandth of a variance.
 
     Raises Refusal IDN002 with fewer readings than unknowns, IDN003 where the model to start with has no rest.
     """
@@ -153,7 +155,7 @@ def fit(
     point = _influential(campaign, point, unknowns)
     start_point = point
     # while weights and unknowns still change a fit need not be exact
-    steps, close, last = NEAR_STEPS if near else MAX_STEPS, NEAR, near
+    steps, close, last = NEAR_STEPS if near else MAX_STEPS, NEAR, near or not exact
     free, dropped = list(unknowns), list[Dropped]()
     again = PRIOR_ROUNDS if any(u.prior is not None for u in unknowns) else 0
     while True:
