@@ -14,6 +14,7 @@ from postproc.diagnosis.candidates import candidates
 from postproc.diagnosis.diagnosis import Diagnosis, diagnose
 from postproc.diagnosis.residual_patterns import patterns
 from postproc.diagnosis.sample import sample_of
+from postproc.diagnosis.search_result import Search
 from postproc.diagnosis.selection import basis_of, outside
 from postproc.diagnosis.verdict import AS_WELL, OTHER_COURSE
 from postproc.identification.campaign import Campaign
@@ -54,7 +55,7 @@ def diagnose_sides(
         return done, ()
     stage("trying sides of approach")
     if _may_explain(campaign, done):
-        other = diagnose(campaign, model)
+        other = diagnose(campaign, model, goes_on=by_approach)
         if _is_better(other, done):
             return other, (_finding(readings.where(0)[0], "they are taken from the order of the rows"),)
     if done.verdict.conditional or done.verdict.word in SOUND:
@@ -67,7 +68,7 @@ def diagnose_sides(
         sided = Campaign(replace(readings, direction=direction), campaign.stated_tool)
         if not _may_explain(sided, done):
             continue
-        tried = diagnose(sided, model)
+        tried = diagnose(sided, model, goes_on=lambda found: False)
         if tried.verdict.word in (*SOUND, "ambiguous") and _is_better(tried, done):
             name = readings.joints[joint][0]
             words = f"those of {name} are taken from the residuals, which lie on two sides"
@@ -75,10 +76,15 @@ def diagnose_sides(
     return done, ()
 
 
+def by_approach(found: Search) -> bool:
+    """Whether an effect that depends on the side of approach was chosen."""
+    return any(candidate.effect.by_direction for candidate in found.chosen)
+
+
 def _may_explain(campaign: Campaign, done: Diagnosis) -> bool:
     """Whether all effects of the sides of approach of ``campaign`` together, beside what was chosen without them,
     explain enough of the residual for a diagnosis of its own."""
-    if any(candidate.effect.by_direction for candidate in done.search.chosen):
+    if by_approach(done.search):
         return True  # it does something else on other sides
     fitted = done.search.final
     sample = sample_of(campaign)
@@ -98,7 +104,7 @@ def _may_explain(campaign: Campaign, done: Diagnosis) -> bool:
     # of few readings that many columns explain a part by chance
     freedom = weights.counts - basis.shape[1]
     remaining *= freedom / max(1, freedom - more.shape[1])
-    return remaining < 1.0 - WORTH_TRYING
+    return bool(remaining < 1.0 - WORTH_TRYING)
 
 
 def _finding(file: str, words: str) -> Finding:
@@ -127,7 +133,7 @@ def _shown(done: Diagnosis) -> list[tuple[int, Floats]]:
 
     Where an effect of approach was found with every gear in the middle of its gap, residuals are those from there; of
     a deflection the side is that of the unloaded joint, which is subtracted."""
-    gaps = any(candidate.effect.by_direction for candidate in done.search.chosen)
+    gaps = by_approach(done.search)
     fitted = done.search.confirmed if gaps else done.base
     above = -1.0 if fitted.campaign.readings.deflection and gaps else 1.0
     campaign = fitted.campaign

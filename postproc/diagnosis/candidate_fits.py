@@ -27,9 +27,7 @@ def in_scales(fitted: Fit, unknowns: Sequence[Unknown]) -> Floats:
     return np.asarray((fitted.point.values(unknowns) - nulls) / scales(unknowns))
 
 
-def with_effects(
-    campaign: Campaign, base: Fit, chosen: Sequence[Candidate], exact: bool = True
-) -> Fit:
+def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate], exact: bool = True) -> Fit:
     """The non-linear fit with the effects ``chosen`` added to ``base``, its own unknowns fitted along; ``exact`` as of
     ``fit``."""
     model, unknowns = composed(base.model, chosen)
@@ -41,7 +39,14 @@ def with_effects(
     additional = [
         replace(u, value=start.get(u.key, u.value)) if u.prior is None else u for u in with_gauge(unknowns)
     ]
-    fitted = fit(campaign, model.with_values(start), [*own, *additional], nuisances=base.point.nuisances, factor=base.factor, exact=exact)
+    fitted = fit(
+        campaign,
+        model.with_values(start),
+        [*own, *additional],
+        nuisances=base.point.nuisances,
+        factor=base.factor,
+        exact=exact,
+    )
     if not any(candidate.effect.by_direction for candidate in chosen):
         return fitted
     return put_back(campaign, fitted, {u.key for u in own})
@@ -56,7 +61,7 @@ class ChoiceFits:
         self._done: dict[tuple[frozenset[object], bool], Fit] = {}
 
     def of(self, chosen: Sequence[Candidate], exact: bool = True) -> Fit:
-        """``with_effects`` of ``chosen``; ``base`` of none.  Where only squares are compared it need not be ``exact``."""
+        """``with_effects`` of ``chosen``; ``base`` of none.  Where squares are compared it need not be ``exact``."""
         if not chosen:
             return self.base
         key = frozenset((c.key, tuple(u.parameter.name for u in c.unknowns), c.start) for c in chosen)

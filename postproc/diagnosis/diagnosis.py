@@ -60,9 +60,13 @@ class Diagnosis:
 
 
 def diagnose(
-    campaign: Campaign, model: StiffnessModel, stage: Callable[[str], None] = lambda name: None
+    campaign: Campaign,
+    model: StiffnessModel,
+    stage: Callable[[str], None] = lambda name: None,
+    goes_on: Callable[[Search], bool] = lambda found: True,
 ) -> Diagnosis:
-    """Raises Refusal DIA001 with too few poses for any verdict, and as ``fit`` does."""
+    """Raises Refusal DIA001 with too few poses for any verdict, and as ``fit`` does.  ``goes_on``: whether a search of
+    which something is rejected is done again without that."""
     if campaign.poses < FEWEST_POSES:
         raise Refusal(
             Finding(
@@ -86,6 +90,8 @@ def diagnose(
     for _ in range(AGAIN):
         # of what has no form that is known others would only be imitations
         if not verdict.rejected or any(why == OTHER_COURSE for _, why in verdict.rejected):
+            break
+        if not goes_on(result):
             break
         result = search(fits, _banned(rejected))
         verdict = judge(result)

@@ -133,7 +133,7 @@ def fit(
     stated, they are as wide as the residuals ask for.  ``robust``: readings far off are weighed down (Huber).
     ``nuisances``: tracker and targets to start with, where they are about known; ``near``: so is the model, the columns
     at which serve all through.  ``factor``: about the variance of the readings over the assumed one, to start with.
-    Where it need not be ``exact`` the last step may be one of ``NEAR``: squares are right to a thousandth of a variance.
+    Where it need not be ``exact`` the last step may be one of ``NEAR``, a thousandth of a variance.
 
     Raises Refusal IDN002 with fewer readings than unknowns, IDN003 where the model to start with has no rest.
     """

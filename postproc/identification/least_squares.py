@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -171,6 +172,26 @@ def bounded_step(
     return np.asarray(step / length)
 
 
+class Linearized(NamedTuple):
+    """A linear problem: ``whitened`` columns (n, k) of readings and ``rows`` (p, k) of priors.  Where columns serve for
+    many problems they are ``rotation`` (n, k) times ``reduced`` (k, k); None where they do not."""
+
+    whitened: Floats
+    rows: Floats
+    rotation: Floats
+    reduced: Floats | None
+
+    def step(self, target: Floats, within: tuple[Floats, Floats], parameters: int, careful: float) -> Floats:
+        """(k,) as of ``bounded_step`` for ``target`` (n + p,), ``within`` the lowest and the highest (k,) each."""
+        if self.reduced is None:
+            return bounded_step(
+                np.concatenate([self.whitened, self.rows]), target, *within, parameters, careful
+            )
+        count = len(self.whitened)
+        short = np.concatenate([self.rotation.T @ target[:count], target[count:]])
+        return bounded_step(np.concatenate([self.reduced, self.rows]), short, *within, parameters, careful)
+
+
 def descended(
     campaign: Campaign,
     point: Point,
@@ -185,8 +206,8 @@ def descended(
 
     ``keep_columns``: those of ``point`` serve all through, for fits that end close by.  ``factor``: variance of the
     readings over the one of ``weights``; priors count the more against it.  Each linear problem is solved
-    within the bounds; steps are halved until the squares fall.  ``close``: step that is the last, in standard
-    deviations of a reading.
+    within the bounds; steps are halved until the squares fall, each after what it was not foreseen to do is undone.
+    ``close``: step that is the last, in standard deviations of a reading.
     """
     scale = scales(unknowns)
 
@@ -197,7 +218,7 @@ def descended(
 
     residual, lost = residuals(point)
     fresh, careful = point.columns is not None, 0.0
-    whitened = rotation = np.empty((0, 0))
+    whitened = rotation = reduced = np.empty((0, 0))
     for _ in range(max_steps):
         if not fresh or not len(whitened):
             point = point if fresh else with_columns(campaign, point, unknowns)
@@ -213,11 +234,8 @@ def descended(
             return replace(point, settled=True)
         # a column of nothing may grow with the others, however straight their path is
         awake = matrix[:, : len(scale)].any(axis=0)
-        system, target = matrix, residual
-        if keep_columns:
-            system = np.concatenate([reduced, rows])
-            target = np.concatenate([rotation.T @ residual[: len(whitened)], residual[len(whitened) :]])
-        whole = bounded_step(system, target, *reach(campaign, point, unknowns), len(scale), careful)
+        linear = Linearized(whitened, rows, rotation, reduced if keep_columns else None)
+        whole = linear.step(residual, reach(campaign, point, unknowns), len(scale), careful)
         share, moved, after, gone = 1.0, point, residual, lost
         freedom = max(1, len(residual) - matrix.shape[1])
         # where there is nothing to gain no part of the step is tried either
@@ -225,11 +243,13 @@ def descended(
         for _ in range(1 if ending else 12):
             moved = _stepped(campaign, point, unknowns, share * whole, scale)
             after, gone = residuals(moved)
-            astray = residual - share * (matrix @ whole) - after
-            if not ending and np.linalg.norm(astray) > CURVED * share * np.linalg.norm(matrix @ whole):
-                # back to the floor of the valley, which was curved: columns of the point serve once more
-                back = bounded_step(system, -astray if not keep_columns else np.concatenate([rotation.T @ -astray[: len(whitened)], -astray[len(whitened) :]]), *reach(campaign, moved, unknowns), len(scale), careful)
-                other = _stepped(campaign, moved, unknowns, back, scale)
+            foreseen = matrix @ (share * whole)
+            bent = residual - foreseen - after
+            if not ending and np.linalg.norm(bent) > CURVED * np.linalg.norm(foreseen):
+                # along a curved valley: what was not foreseen is undone with the same columns (second order)
+                within = reach(campaign, moved, unknowns)
+                undone = linear.step(-bent, within, len(scale), careful)
+                other = _stepped(campaign, moved, unknowns, undone, scale)
                 its, lacks = residuals(other)
                 if lacks <= gone and its @ its < after @ after:
                     moved, after, gone = other, its, lacks

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc import __version__
-from postproc.base.arrays import Floats
+from postproc.base.arrays import Floats, Ints
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import place
 from postproc.base.units import DEG, MM
@@ -57,6 +57,13 @@ USUAL_SIGMA = 0.03 * MM
 WILD, FEW = 10.0, 0.05
 """Standard deviations from which on a reading is an accident, and the share of all that may be."""
 
+POSE_OFF = "so are others of this pose, so the arm stood elsewhere: measure the pose again"
+"""What it may be where a pose is off as a whole."""
+
+BESIDE_A_POSE = {"nothing_missing": "unknown", "named": "partly_named"}
+"""Verdicts on all other readings -> on all, where a pose is off as a whole: what opens under one load alone looks like
+an accident."""
+
 TRIED = 2
 """Explanations of a set that the first is distinguished from."""
 
@@ -102,12 +109,20 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
     if wild:
         stage("once more without outliers")
         inliers = np.setdiff1d(np.arange(len(campaign)), [one.row for one in wild])
-        rest = Campaign(campaign_of(diagnosis).readings.part(inliers), campaign.stated_tool)
+        struck = campaign_of(diagnosis)
+        rest = Campaign(struck.readings.part(inliers), campaign.stated_tool)
+        whole = poses_off(struck, wild)
         diagnosis = diagnose(rest, model)
+        if len(whole):
+            verdict = diagnosis.verdict
+            diagnosis = replace(
+                diagnosis, verdict=replace(verdict, word=BESIDE_A_POSE.get(verdict.word, verdict.word))
+            )
         findings += [
             Finding(
                 "DIA002",
-                f"the reading is {one.distance / MM:.3g} mm off ({one.sigmas:.0f} sigma): {one.what}",
+                f"the reading is {one.distance / MM:.3g} mm off ({one.sigmas:.0f} sigma): "
+                + (POSE_OFF if struck.pose[one.row] in whole else one.what),
                 one.file,
                 one.line,
             )
@@ -199,10 +214,16 @@ def gross_errors(final: Fit) -> tuple[Outlier, ...]:
         return ()
     detected, _ = outliers(final, np.ones(len(length), bool))
     wild = tuple(one for one in detected if one.sigmas > WILD)
-    at_pose = np.bincount(final.campaign.pose[[one.row for one in wild]]) if wild else np.zeros(1)
     # an accident strikes one reading, or one pose: where several poses are off as a whole, the arm was there
-    by_accident = len(wild) <= FEW * len(length) and (at_pose > 1).sum() <= 1
+    by_accident = len(wild) <= FEW * len(length) and len(poses_off(final.campaign, wild)) <= 1
     return wild if by_accident else ()
+
+
+def poses_off(campaign: Campaign, wild: Sequence[Outlier]) -> Ints:
+    """Numbers (K,) of poses at which several readings are off: of one a beam may be broken, but where others say the
+    same the arm stood elsewhere."""
+    pose = campaign.pose[[one.row for one in wild]]
+    return np.flatnonzero(np.bincount(pose, minlength=1) > 1)
 
 
 def _next_poses(request: DiagnoseRequest, measured: Measured, diagnosis: Diagnosis) -> NextPoses | None:
