@@ -45,7 +45,8 @@ class CandidateSetups:
     (3,) [m], robot base, None: every reflector is seen; cone [rad]: half angle about the direction in which a
     reflector faces; spacing [rad]: two poses differ by that in one axis at least; spread: and by that share of the
     ranges of the axes in the mean.  pulls (P, 3) [N]: forces at the TCP, robot base axes, that can be pulled with, each
-    an alternative to the loads.
+    an alternative to the loads.  shared [m]: one standard deviation of what the readings of a pose have in common in
+    each coordinate, beside ``sigma``.
     """
 
     tool: Poses
@@ -63,6 +64,7 @@ class CandidateSetups:
     spacing: float
     pulls: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     spread: float = 0.0
+    shared: float = 0.0
 
     @property
     def facing(self) -> Floats:

@@ -13,7 +13,7 @@ from postproc.experiments.candidate_setups import CandidateSetups, Setups, readi
 from postproc.identification.campaign import SCALE, SCALE_NAME, Campaign, Nuisances
 from postproc.identification.identifiable import COVERAGE, Identifiability, identifiability
 from postproc.identification.least_squares import prior_rows, scales
-from postproc.identification.noise import noise_of, weighting
+from postproc.identification.noise import Weighting, noise_of, weighting
 from postproc.identification.registration import registered
 from postproc.identification.sensitivities import columns
 from postproc.identification.unknowns import Unknown
@@ -52,12 +52,11 @@ def observability(
     """What ``setups`` show under ``model``; NaN where it has no equilibrium."""
     campaign = Campaign(readings_of(model, candidates, setups))
     predicted, given = campaign.predicted(model), _placed(campaign, candidates)
-    weight = _weights(candidates, setups)[:, :, None]
     derivatives = columns(campaign, model, unknowns, predicted, given)
     nuisance = campaign.nuisance_columns(predicted, given)
     return Observability(
-        derivatives.reshape(*weight.shape[:2], len(unknowns)) * weight,
-        nuisance.reshape(*weight.shape[:2], len(campaign.nuisance_names)) * weight,
+        _whitened(candidates, setups, derivatives),
+        _whitened(candidates, setups, nuisance),
         campaign.nuisance_names,
     )
 
@@ -65,11 +64,8 @@ def observability(
 def expected(model: StiffnessModel, candidates: CandidateSetups, setups: Setups) -> Floats:
     """(C, r) whitened, what the readings of ``setups`` would be; NaN where the model has no equilibrium."""
     campaign = Campaign(readings_of(model, candidates, setups))
-    weight = _weights(candidates, setups)
-    return (
-        campaign.expected(campaign.predicted(model), _placed(campaign, candidates))[0].reshape(weight.shape)
-        * weight
-    )
+    places = campaign.expected(campaign.predicted(model), _placed(campaign, candidates))[0]
+    return _whitened(candidates, setups, places)
 
 
 def _placed(campaign: Campaign, candidates: CandidateSetups) -> Nuisances:
@@ -82,9 +78,14 @@ def _placed(campaign: Campaign, candidates: CandidateSetups) -> Nuisances:
     )
 
 
-def _weights(candidates: CandidateSetups, setups: Setups) -> Floats:
-    """(C, r) 1 / sigma of each coordinate, 0 of targets out of sight."""
-    return np.repeat(np.tile(setups.visible, (1, setups.load.shape[1])), 3, axis=1) / candidates.sigma
+def _whitened(candidates: CandidateSetups, setups: Setups, values: Floats) -> Floats:
+    """(C, r, ...) of ``values`` (R, 3, ...) [m] of the readings of ``setups``: in standard deviations, independent; 0
+    of targets out of sight."""
+    seen = np.tile(setups.visible, (1, setups.load.shape[1]))
+    weight = np.repeat(seen.reshape(-1, 1), 3, axis=1) / candidates.sigma
+    pose = np.repeat(np.arange(len(setups)), seen.shape[1])
+    whitened = Weighting(weight, pose, candidates.shared)(values)
+    return np.asarray(whitened.reshape(len(setups), 3 * seen.shape[1], *values.shape[2:]))
 
 
 def measured(

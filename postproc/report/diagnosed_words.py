@@ -20,8 +20,13 @@ from postproc.report.formatting import count, fixed, listed, shown_unit
 from postproc.report.formatting import millimetres as _mm
 from postproc.report.terminal import short_names
 
-SETTLES = MARGIN**0.5
-"""Standard deviations by which two explanations must differ for one to be named."""
+LIKELY = 1.645
+"""Standard deviations within which chance leaves a difference with a probability of 95 %, to one side."""
+
+SETTLES = LIKELY + (LIKELY**2 + MARGIN) ** 0.5
+"""Standard deviations d by which two explanations must differ for one to be named with a probability of 95 %: -2
+ln(likelihood) of the other is then worse by d^2 in the mean, and by d^2 - 2 d ``LIKELY`` at least, which is to be
+``MARGIN``."""
 
 KEY = 10
 """One of so many poses may show what no other does."""

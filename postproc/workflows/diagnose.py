@@ -9,50 +9,31 @@ from pathlib import Path
 import numpy as np
 
 from postproc import __version__
-from postproc.base.arrays import Floats, Ints
+from postproc.base.arrays import Ints
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import place
-from postproc.base.units import DEG, MM
+from postproc.base.units import MM
 from postproc.diagnosis.approach_sides import diagnose_sides
-from postproc.diagnosis.candidate_fits import composed
-from postproc.diagnosis.candidates import Candidate
 from postproc.diagnosis.diagnosis import Diagnosis, diagnose
 from postproc.diagnosis.search import model_unknowns
-from postproc.experiments.candidate_setups import CandidateSetups, readings_of, spacings, usable_limits
-from postproc.experiments.discrimination import apart
-from postproc.experiments.measuring_order import measuring_order
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, lengths, spread_of
 from postproc.identification.outliers import Outlier, outliers
 from postproc.identification.sanity_checks import check_fit, check_numbers
-from postproc.identification.unknowns import Unknown
 from postproc.identification.validation import held_out, validated
-from postproc.measurements import Readings, measurements_csv, read_measurements
-from postproc.model import STANDARD_GRAVITY, approach
+from postproc.measurements import measurements_csv, read_measurements
 from postproc.output.atomic_write import write_atomically
-from postproc.report.diagnosed import HANGS, Diagnosed, NextPoses, ValidatedFile, diagnosed_csv
-from postproc.report.diagnosed_words import SETTLES
+from postproc.report.diagnosed import HANGS, Diagnosed, ValidatedFile, diagnosed_csv
 from postproc.report.report import json_bytes
 from postproc.report.residuals import Sizes, lengths_of
 from postproc.robot.description import Robot
 from postproc.workflows.identify import Measured, measured_of
+from postproc.workflows.next_poses import hung_weights, next_poses, within_payload
 from postproc.workflows.preparation import Stage, silent
 from postproc.workflows.readings_request import ReadingsRequest, spare_inputs
 from postproc.workflows.robot_files import new_robot_file
 
 FOLDS = 5
-
-NEXT = 6
-"""Poses proposed to distinguish two explanations."""
-
-HARDLY = 0.5
-"""Standard deviations between two explanations below which poses are not worth measuring."""
-
-LOADS = 3
-"""Of the weights that were hung, so many different ones are proposed again."""
-
-USUAL_SIGMA = 0.03 * MM
-"""Scatter that poses are proposed for where nothing states one."""
 
 WILD, FEW = 10.0, 0.05
 """Standard deviations from which on a reading is an accident, and the share of all that may be."""
@@ -63,19 +44,6 @@ POSE_OFF = "so are others of this pose, so the arm stood elsewhere: measure the 
 BESIDE_A_POSE = {"nothing_missing": "unknown", "named": "partly_named"}
 """Verdicts on all other readings -> on all, where a pose is off as a whole: what opens under one load alone looks like
 an accident."""
-
-TRIED = 2
-"""Explanations of a set that the first is distinguished from."""
-
-WIDER = 0.05
-"""Share of the range of an axis by which next poses may leave what was measured."""
-
-CANDIDATES = 300
-"""Poses to choose from."""
-
-SPREAD = 0.15
-"""Share of the ranges of the axes, in the mean, by which two proposed poses differ at least: what is repeated at one
-pose repeats its errors too.  Of two random poses it is a third."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +104,7 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
     planned = None
     if diagnosis.verdict.word == "ambiguous" and not diagnosis.agreed:
         stage("looking for poses that settle it")
-        planned = _next_poses(request, measured, diagnosis)
+        planned = next_poses(measured, diagnosis, heaviest(request, measured.robot), request.pulls)
     result = Diagnosed(
         robot=measured.robot.name,
         robot_digest=measured.robot.digest,
@@ -226,150 +194,10 @@ def poses_off(campaign: Campaign, wild: Sequence[Outlier]) -> Ints:
     return np.flatnonzero(np.bincount(pose, minlength=1) > 1)
 
 
-def _next_poses(request: DiagnoseRequest, measured: Measured, diagnosis: Diagnosis) -> NextPoses | None:
-    """Poses, of those loads and targets that were used, at which the explanations disagree most; None where none do."""
-    offer = _candidate_setups(request, measured, diagnosis.search.base)
-    # where the arm was it can go again
-    narrow = replace(offer, limits=_measured_ranges(measured.readings.q, offer.limits))
-    if measured.readings.deflection and not len(offer.loads) + len(offer.pulls):
-        return None  # what can be hung or pulled with is not known
-    pairs = [(first, other) for first, *others in diagnosis.verdict.alternatives for other in others[:TRIED]]
-    # poses that differ less are better than none
-    for offered in (narrow, offer, replace(offer, spread=0.0)):
-        tried = [_discriminating_poses(measured, diagnosis, offered, one, other) for one, other in pairs]
-        plans = [plan for plan in tried if plan]
-        best = max(plans, key=lambda plan: min(plan.separation), default=None)
-        if best is not None and (min(best.separation) >= SETTLES or offered is not narrow):
-            return replace(best, beyond=_beyond(measured, best, narrow.limits))
-    return None
-
-
-def _measured_ranges(q: Floats, limits: Floats) -> Floats:
-    """(n, 2) [rad, m] the ranges of ``q`` (R, n), a little widened, within the ``limits`` (n, 2)."""
-    low, high = q.min(axis=0), q.max(axis=0)
-    wider = WIDER * (high - low)
-    return np.stack(
-        [np.clip(low - wider, *limits.T), np.maximum(np.clip(high + wider, *limits.T), limits[:, 0])], axis=1
-    )
-
-
-def _beyond(measured: Measured, plan: NextPoses, ranges: Floats) -> tuple[str, ...]:
-    """Names of the joints that a plan moves out of ``ranges`` (n, 2) [rad, m]."""
-    q = plan.readings.q
-    out = np.flatnonzero(((q < ranges[:, 0] - 1e-9) | (q > ranges[:, 1] + 1e-9)).any(axis=0))
-    return tuple(measured.robot.joints[i].name for i in out)
-
-
-def _discriminating_poses(
-    measured: Measured, diagnosis: Diagnosis, candidates: CandidateSetups, one: Candidate, other: Candidate
-) -> NextPoses | None:
-    base = diagnosis.search.base
-    model, first = composed(base.model, [one])
-    model, second = composed(model, [other])
-    # the first has its fitted values; the second those of its usual size
-    model = model.with_values(_values(diagnosis.search.final, first, one))
-    common = [u for u in base.unknowns if u.prior is None]
-    try:
-        poses = apart(model, first, second, common, candidates, (NEXT,), candidates=CANDIDATES)
-    except Refusal:
-        return None
-    if min(poses.separation[NEXT]) < HARDLY:
-        return None
-    setups = poses.chosen[NEXT]
-    setups = setups[measuring_order(setups.q, spacings(measured.robot, candidates.spacing))]
-    return NextPoses(
-        _like(measured, readings_of(model, candidates, setups)), (one, other), poses.separation[NEXT]
-    )
-
-
-def _like(measured: Measured, planned: Readings) -> Readings:
-    """The plan with the columns that the readings so far have, so that both can be read as one: time and temperature
-    are to be filled in, senses of approach follow from the order."""
-    before, empty = measured.readings, np.full(len(planned), np.nan)
-    direction = planned.direction
-    if before.direction is None:
-        direction = None
-    elif direction is None:
-        direction = approach(planned.q)
-    return replace(
-        planned,
-        in_robot_frame=before.in_robot_frame,
-        tool=before.tool,
-        places={name: place for name, place in before.places.items() if name not in before.on_base},
-        time=None if before.time is None else empty,
-        temperature=None if before.temperature is None else empty,
-        direction=direction,
-    )
-
-
-def _values(final: Fit, unknowns: Sequence[Unknown], candidate: Candidate) -> dict[tuple[int, str], float]:
-    """The fitted values of a candidate's parameters, as values of a model in which they are ``unknowns``."""
-    wanted = (candidate.name, candidate.effect.described())
-    fitted = next(
-        (t.values for t in final.model.terms if (t.effect.name, t.effect.described()) == wanted), {}
-    )
-    return {u.key: fitted[u.parameter.name] for u in unknowns if u.parameter.name in fitted}
-
-
-def _candidate_setups(request: DiagnoseRequest, measured: Measured, base: Fit) -> CandidateSetups:
-    """What was measured with: targets, weights within the payload, scatter; and pulls where there can be such."""
-    readings, campaign = measured.readings, measured.campaign
-    in_flange = campaign.tool.rotation @ base.point.nuisances.places[:, :, None]
-    moving = ~campaign.on_base
-    loads = within_payload(hung_weights(readings), heaviest(request, measured.robot))
-    pulls = pulls_like(readings) if request.pulls else np.zeros((0, 3))
-    if len(loads) > LOADS:
-        loads = loads[np.linspace(0, len(loads) - 1, LOADS).round().astype(int)]
-    return CandidateSetups(
-        tool=campaign.tool,
-        targets=tuple(name for name in readings.targets if name not in readings.on_base),
-        places=(in_flange[:, :, 0] + campaign.tool.position)[moving],
-        rough=campaign.tracked,
-        loads=loads if len(loads) or readings.deflection else np.zeros(1),
-        pulls=pulls,
-        each_load=False,
-        deflection=readings.deflection,
-        sigma=float(np.median(base.noise.sigma)) if base.noise.known else USUAL_SIGMA,
-        limits=usable_limits(measured.robot, {}),
-        box=_box(),
-        tracker=None,
-        cone=np.pi,
-        spacing=5 * DEG,
-        spread=SPREAD,
-    )
-
-
-def hung_weights(readings: Readings) -> Floats:
-    """(L,) [kg] weights that were hung: forces straight down, not pulls; 0 too where places without a load are
-    measured."""
-    force = readings.wrench[:, :3]
-    size = np.linalg.norm(force, axis=1)
-    down = -force[:, 2] >= HANGS * size
-    loads = np.unique(np.round(size[down] / STANDARD_GRAVITY, 1))
-    return loads[loads > 0] if readings.deflection else loads
-
-
 def heaviest(request: DiagnoseRequest, robot: Robot) -> float:
     """[kg] the weight that may be hung at most, infinite where nobody states one."""
     stated = robot.rated_payload if request.payload_kg is None else request.payload_kg
     return np.inf if stated is None else stated
-
-
-def within_payload(loads: Floats, payload: float) -> Floats:
-    """(K,) [kg] those of ``loads`` (L,) that the robot may carry."""
-    return loads[loads <= payload]
-
-
-def pulls_like(readings: Readings) -> Floats:
-    """(6, 3) [N] along and against each axis of the robot base, as large as the largest force that was measured with;
-    none where there was none."""
-    size = float(np.linalg.norm(readings.wrench[:, :3], axis=1).max(initial=0.0))
-    return size * np.concatenate([np.eye(3), -np.eye(3)]) if size > 0 else np.zeros((0, 3))
-
-
-def _box() -> Floats:
-    """Nothing below the floor that the robot is on."""
-    return np.array([[-np.inf, np.inf], [-np.inf, np.inf], [0.0, np.inf]])
 
 
 def _published(request: DiagnoseRequest, measured: Measured, result: Diagnosed, stage: Stage) -> Diagnosed:

@@ -14,8 +14,8 @@ from .hidden import EVERY, OUTSIDE
 
 Records = Sequence[dict]
 
-SEPARATE = 3.2
-"""Standard deviations between two explanations from which on a plan is said to tell them apart."""
+SEPARATE = 5.2
+"""Standard deviations between two explanations from which on a plan is said to distinguish them."""
 
 
 def share(records: Records, holds: Callable[[dict], bool]) -> str:
