@@ -22,6 +22,7 @@ from postproc.measurements import measurements_csv, planned, read_measurements
 from postproc.model import StiffnessModel, approach
 from postproc.robot.description import find_robot, load_robot
 from postproc.workflows import diagnose as workflow
+from postproc.workflows import next_poses
 from postproc.workflows.diagnose import DiagnoseRequest
 from postproc.workflows.identify import measured_of
 
@@ -182,7 +183,7 @@ def undecided(found, monkeypatch):
     verdict = replace(found.verdict, word="ambiguous", alternatives=((one.candidate, other),))
     doubted = replace(found, verdict=verdict, final=found.search.base, agreed=False)
     monkeypatch.setattr(workflow, "diagnose_sides", lambda campaign, model, stage: (doubted, ()))
-    monkeypatch.setattr(workflow, "CANDIDATES", 100)
+    monkeypatch.setattr(next_poses, "CANDIDATES", 100)
 
 
 @pytest.mark.parametrize("command", [("diagnose",), ("identify", "--effects", "joint_compliance")])

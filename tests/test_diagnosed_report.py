@@ -162,7 +162,7 @@ def next_poses(result, **change) -> NextPoses:
     joints = [(joint.name, False) for joint in result.final.model.robot.joints]
     readings = planned(joints, q, wrench, True, tool=TOOL, **markers, **change)
     (between,) = doubtful(result).verdict.alternatives
-    return NextPoses(readings, between, (4.2, 5.1))
+    return NextPoses(readings, between, (6.2, 7.1))
 
 
 def told(result, verbose=False, width=160) -> str:
@@ -635,13 +635,13 @@ def test_what_is_said_of_doubt(spring):
     assert f"More is missing: the residual is {millimetres(result.rms['explained'])} RMS" in paragraph(more)
     planned = replace(result, next_poses=next_poses(spring))
     assert "Measure these 2 poses: there gravity_compensator on A2" in paragraph(planned)
-    assert "by 4.2 standard deviations" in paragraph(planned)
+    assert "by 6.2 standard deviations" in paragraph(planned)
     assert "ranges measured so far" not in paragraph(planned)
     far = replace(planned, next_poses=replace(planned.next_poses, beyond=("A2", "A4")))
     assert "They leave the ranges measured so far of A2 and A4" in paragraph(far)
     near = replace(planned, next_poses=replace(planned.next_poses, separation=(9.0, 0.4)))
     assert "would not distinguish them: there gravity_compensator on A2" in paragraph(near)
-    assert "differ by 0.4 standard deviations, 3.2 are required" in paragraph(near)
+    assert "differ by 0.4 standard deviations, 5.2 are required" in paragraph(near)
     assert "Measure these" not in paragraph(near)
     assert "Measure these 2 poses (which.csv): " in paragraph(replace(planned, next_poses_file="which.csv"))
 

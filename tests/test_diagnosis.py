@@ -14,7 +14,7 @@ from blind.real_worlds import campaign as drawn_campaign
 from measured import MARKERS, on_markers, plan, robot
 
 from postproc.base.geometry import Poses
-from postproc.diagnosis import verdict
+from postproc.diagnosis import approach_sides, candidate_fits, diagnosis, verdict
 from postproc.diagnosis.candidate_fits import ChoiceFits
 from postproc.diagnosis.candidates import candidates, fewest_parameters, is_visible
 from postproc.diagnosis.decoys import AlternativeForm, decoys
@@ -26,6 +26,7 @@ from postproc.diagnosis.selection import complexity_penalty, counts, explained, 
 from postproc.diagnosis.verdict import (
     BUILT,
     MARGIN,
+    ONLY_TOGETHER,
     OTHER_COURSE,
     ambiguity_set,
     held_out_gain,
@@ -421,3 +422,88 @@ def test_of_two_forms_with_the_same_parameters_one_stays():
     assert fewest_parameters([one, same]) == [one]
     assert fewest_parameters([same, one]) == [same]
     assert fewest_parameters([whole, one]) == [one]
+
+
+# What is fitted, and how often
+
+
+def test_a_choice_is_fitted_once(monkeypatch):
+    """A search that is done again comes by the same choices; what is exact serves where it need not be."""
+    campaign = campaign_of(stated(), 12)
+    base = fitted(campaign)
+    one, other = (
+        next(c for c in candidates(campaign, base.model, base.point.nuisances) if (c.name, c.joint) == key)
+        for key in (("joint_stiffening", "A2"), ("joint_stiffening", "A3"))
+    )
+    asked: list[bool] = []
+    done = candidate_fits.with_effects
+
+    def counted(campaign, base, chosen, exact=True):
+        asked.append(exact)
+        return done(campaign, base, chosen, exact)
+
+    monkeypatch.setattr(candidate_fits, "with_effects", counted)
+    fits = ChoiceFits(campaign, base)
+    assert fits.of([]) is base
+    rough = fits.of([one, other], exact=False)
+    assert fits.of([other, one], exact=False) is rough
+    exact = fits.of([one, other])
+    assert fits.of([one, other], exact=False) is fits.of([other, one]) is exact
+    assert asked == [False, True]
+    assert fits.of([one]) is not exact
+
+
+def test_half_an_explanation_names_nobody(monkeypatch):
+    """Where what is clear makes the readings worse without what is not, all that was found fits only together."""
+    spring = StiffnessModel.from_robot(robot("kuka_kr270"))
+    plain = StiffnessModel.from_robot(load_robot(SAMPLES / "kr270_missing_compensator" / "kr270_plain.yaml"))
+    campaign = campaign_of(spring, 16, loads=(1200.0, 2600.0))
+
+    def with_another(fits, banned=()):
+        found = search(fits, banned)
+        other = next(c for c in found.linear.candidates if (c.name, c.joint) == ("joint_stiffening", "A3"))
+        return replace(found, chosen=(*found.chosen, other))
+
+    def undecided(found):
+        told = judge(found)
+        (spring_of,), clear = told.named, found.chosen[-1]
+        other = next(c for c in found.linear.candidates if (c.name, c.joint) == ("joint_stiffening", "A2"))
+        named = spring_of, replace(spring_of, candidate=clear, joints=("A3",))
+        return replace(told, word="ambiguous", named=named, alternatives=((spring_of.candidate, other),))
+
+    def diagnosed(*squares):
+        left = iter(squares)
+        monkeypatch.setattr(diagnosis, "_squares", lambda fit, weights: next(left))
+        return diagnosis.diagnose(campaign, plain)
+
+    monkeypatch.setattr(diagnosis, "search", with_another)
+    monkeypatch.setattr(diagnosis, "judge", undecided)
+    monkeypatch.setattr(diagnosis, "largest_disagreement", lambda *words: np.inf)
+    # with what is clear, with the model's own parameters alone, as the robot file is
+    half = diagnosed(2.0, 1.0, 3.0)
+    assert (half.verdict.word, half.verdict.named, half.agreed) == ("unknown", (), False)
+    assert [why for _, why in half.verdict.rejected] == [ONLY_TOGETHER] * 2
+    assert half.final.model.terms == half.base.model.terms
+    good = diagnosed(1.0, 2.0, 3.0)
+    assert (good.verdict.word, len(good.verdict.named)) == ("ambiguous", 2)
+    assert good.verdict.rejected == ()
+
+
+# Sides of approach
+
+
+def test_many_columns_of_few_readings_are_no_sides(monkeypatch):
+    """All effects of approach together explain a part of any residual, the more the fewer readings there are."""
+    campaign = campaign_of(stated(), 8)
+    some = Campaign(replace(campaign.readings, direction=np.zeros_like(campaign.readings.q)))
+    base = fitted(some)
+    done = SimpleNamespace(search=SimpleNamespace(chosen=(), final=base))
+    rng = np.random.default_rng(1)
+    sides = [
+        Campaign(replace(campaign.readings, direction=np.repeat(rng.choice([-1.0, 1.0], (8, 6)), 3, axis=0)))
+        for _ in range(10)
+    ]
+    tried = sum(approach_sides._may_explain(one, done) for one in sides)
+    monkeypatch.setattr(approach_sides, "WORTH_TRYING", -10.0)
+    assert all(approach_sides._may_explain(one, done) for one in sides)
+    assert tried <= 5

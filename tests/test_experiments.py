@@ -14,19 +14,22 @@ from tiers import examples
 from postproc.base.findings import Refusal
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG
+from postproc.diagnosis.imitations import MARGIN
 from postproc.experiments import pool, precision
 from postproc.experiments.candidate_setups import CandidateSetups, drawn, readings_of, spacings, usable_limits
 from postproc.experiments.criteria import AtTestPoses, Determinant, Disagreement, Minimax
-from postproc.experiments.discrimination import CompetingModel, apart, discriminating, rivalry
+from postproc.experiments.discrimination import CompetingModel, KnownReadings, apart, discriminating, rivalry
 from postproc.experiments.exchange import CandidateSet, exchanged, grown, random_choice
 from postproc.experiments.measuring_order import measuring_order
 from postproc.experiments.observability import influential, judged, measured, observability
 from postproc.experiments.precision import DesignProblem, choices_of, designs, predicted
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import fit
+from postproc.identification.noise import Weighting
 from postproc.identification.unknowns import asked_for
 from postproc.measurements import measurements_csv, read_measurements
 from postproc.model import StiffnessModel
+from postproc.report.diagnosed_words import SETTLES
 from postproc.robot.description import find_robot, load_robot
 
 TARGETS = np.array([[0.3, 0.0, 0.1], [-0.15, 0.26, 0.1], [-0.15, -0.26, 0.1]])
@@ -642,3 +645,49 @@ def test_units_of_the_search_do_not_matter(kr270):
             [float(Minimax(counts).score(choices.information(range(k, k + 9)))) for k in range(0, 50, 5)]
         )
     np.testing.assert_allclose(np.subtract(*scores), np.log(10.0), rtol=5e-3)
+
+
+def test_what_was_read_and_what_else_is_fitted_counts(kr270):
+    """A difference that other parameters make up for is none, as far as earlier readings let them."""
+    what = offer(kr270, cone=np.pi)
+    words = ("gravity_compensator.K_c", "joint_stiffening.k3", "joint_compliance.c2", "joint_compliance.c3")
+    asked = asked_for(kr270, words)
+    (own,), (other,), common = (
+        [u for u in asked.unknowns if u.name.startswith(word)]
+        for word in ("gravity", "joint_stiffening", "joint_compliance")
+    )
+    model = asked.model.with_values({other.key: 0.1 * other.parameter.scale})
+    loose = [replace(u, prior=1e6 * u.parameter.scale) for u in common]
+    tight = [replace(u, prior=1e-6 * u.parameter.scale) for u in common]
+    setups = drawn(kr270, what, 12, np.random.default_rng(3))
+    few, many = (Campaign(filled_in(model, what, setups[rows])) for rows in (slice(0, 1), slice(0, 12)))
+
+    def separation(common, campaign):
+        weights = Weighting(np.full((len(campaign), 3), 1.0 / what.sigma), campaign.pose)
+        known = KnownReadings(campaign, campaign.start(), weights)
+        return min(
+            apart(model, [own], [other], common, what, (4,), candidates=60, before=known).separation[4]
+        )
+
+    alone = min(apart(model, [own], [other], (), what, (4,), candidates=60).separation[4])
+    assert separation(loose, few) < 0.8 * separation(tight, few)
+    assert separation(loose, few) < separation(loose, many)
+    assert separation(tight, few) == pytest.approx(alone, rel=0.5)
+
+
+def test_what_readings_of_a_pose_share_is_no_news(kr270):
+    what = offer(kr270, cone=np.pi)
+    setups = drawn(kr270, what, 5, np.random.default_rng(4))
+    asked = asked_for(kr270, ("joint_compliance",))
+    sizes = [
+        np.linalg.norm(observability(kr270, asked.unknowns, replace(what, shared=shared), setups).columns)
+        for shared in (0.0, 3e-5, 3e-3)
+    ]
+    assert sizes[0] > 1.1 * sizes[1] > 1.1 * sizes[2]
+
+
+def test_what_is_said_to_settle_is_named_nineteen_times_of_twenty():
+    rng = np.random.default_rng(5)
+    # -2 ln(likelihood) of the other is worse by the squares of d and of chance along it
+    worse = SETTLES**2 + 2.0 * SETTLES * rng.normal(size=100_000)
+    assert (worse > MARGIN).mean() == pytest.approx(0.95, abs=0.003)

@@ -215,7 +215,7 @@ class KnownReadings:
         """(n + k, p) as of ``rivalry``, outside of what tracker and targets explain, and the k priors of ``common``;
         ``apart`` columns of nothing for tracker and targets of the new readings, that may be others."""
         at_fit = self.campaign.predicted(model)
-        nuisance = self._seen(self.campaign.nuisance_columns(at_fit, self.nuisances))
+        nuisance = self._whitened(self.campaign.nuisance_columns(at_fit, self.nuisances))
         parts: list[Floats] = []
         for own, other in ((one, two), (two, one)):
             without = model.with_values({u.key: u.parameter.null for u in other})
@@ -225,21 +225,24 @@ class KnownReadings:
                 there, self.nuisances
             )
             moves = columns(self.campaign, without, own, there, self.nuisances)
-            parts += [self._seen(does[:, :, None] if _has_values(model, own) else moves), self._seen(moves)]
-        every = self._seen(columns(self.campaign, model, common, at_fit, self.nuisances))
-        seen = np.concatenate([parts[0], parts[2], every, parts[1], parts[3]], axis=1)
+            parts += [
+                self._whitened(does[:, :, None] if _has_values(model, own) else moves),
+                self._whitened(moves),
+            ]
+        every = self._whitened(columns(self.campaign, model, common, at_fit, self.nuisances))
+        stacked = np.concatenate([parts[0], parts[2], every, parts[1], parts[3]], axis=1)
         frames = basis(nuisance)
-        seen = seen - frames @ (frames.T @ seen)
+        stacked = stacked - frames @ (frames.T @ stacked)
         before = [parts[0].shape[1] + parts[2].shape[1], parts[1].shape[1] + parts[3].shape[1]]
         priors = prior_rows(common)
         known = np.concatenate(
             [np.zeros((len(priors), before[0])), priors, np.zeros((len(priors), before[1]))], axis=1
         )
-        both = np.concatenate([seen, known[priors.any(axis=1)]])
+        both = np.concatenate([stacked, known[priors.any(axis=1)]])
         place = before[0] + len(common)
         return np.concatenate([both[:, :place], np.zeros((len(both), apart)), both[:, place:]], axis=1)
 
-    def _seen(self, values: Floats) -> Floats:
+    def _whitened(self, values: Floats) -> Floats:
         return np.nan_to_num(self.weights(values))
 
 

@@ -81,11 +81,11 @@ def _placed(campaign: Campaign, candidates: CandidateSetups) -> Nuisances:
 def _whitened(candidates: CandidateSetups, setups: Setups, values: Floats) -> Floats:
     """(C, r, ...) of ``values`` (R, 3, ...) [m] of the readings of ``setups``: in standard deviations, independent; 0
     of targets out of sight."""
-    seen = np.tile(setups.visible, (1, setups.load.shape[1]))
-    weight = np.repeat(seen.reshape(-1, 1), 3, axis=1) / candidates.sigma
-    pose = np.repeat(np.arange(len(setups)), seen.shape[1])
+    visible = np.tile(setups.visible, (1, setups.load.shape[1]))
+    weight = np.repeat(visible.reshape(-1, 1), 3, axis=1) / candidates.sigma
+    pose = np.repeat(np.arange(len(setups)), visible.shape[1])
     whitened = Weighting(weight, pose, candidates.shared)(values)
-    return np.asarray(whitened.reshape(len(setups), 3 * seen.shape[1], *values.shape[2:]))
+    return np.asarray(whitened.reshape(len(setups), 3 * visible.shape[1], *values.shape[2:]))
 
 
 def measured(

@@ -187,10 +187,10 @@ def gross_errors(final: Fit) -> tuple[Outlier, ...]:
     return wild if by_accident else ()
 
 
-def poses_off(campaign: Campaign, wild: Sequence[Outlier]) -> Ints:
-    """Numbers (K,) of poses at which several readings are off: of one a beam may be broken, but where others say the
+def poses_off(campaign: Campaign, several: Sequence[Outlier]) -> Ints:
+    """Numbers (K,) of poses at which more than one reading is off: of one a beam may be broken, but where others say the
     same the arm stood elsewhere."""
-    pose = campaign.pose[[one.row for one in wild]]
+    pose = campaign.pose[[one.row for one in several]]
     return np.flatnonzero(np.bincount(pose, minlength=1) > 1)
 
 
