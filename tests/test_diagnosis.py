@@ -39,9 +39,10 @@ from postproc.effects.transmission_error import TransmissionError
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Estimate, fit
 from postproc.identification.unknowns import asked_for
+from postproc.measurements import measurements_csv
 from postproc.model import StiffnessModel
 from postproc.robot.description import load_robot
-from postproc.workflows.diagnose import gross_errors
+from postproc.workflows.diagnose import DiagnoseRequest, diagnose_robot, gross_errors
 
 SIGMA = 2e-5
 SAMPLES = Path(__file__).parent.parent / "samples"
@@ -346,6 +347,21 @@ def test_accidents_strike_one_reading_or_one_pose():
     assert struck(*range(0, 180, 9)) == [], "so many are no accidents"
 
 
+@pytest.mark.parametrize(("rows", "word"), [((30,), "nothing_missing"), ((30, 31), "unknown")])
+def test_where_two_targets_agree_the_arm_stood_elsewhere(tmp_path, rows, word):
+    """Of one reading a beam may be broken; what opens under one load alone moves all targets of a pose."""
+    good = campaign_of(StiffnessModel.from_robot(robot("kuka_kr270")), 24)
+    value = good.readings.value.copy()
+    value[list(rows)] += [0.0, 2e-3, 0.0]
+    file = tmp_path / "loads.csv"
+    file.write_bytes(measurements_csv(replace(good.readings, value=value)))
+    done = diagnose_robot(DiagnoseRequest(data=(file,), robot="kuka_kr270"))
+    assert (done.verdict.word, done.exit) == (word, 3)
+    told = [finding.message for finding in done.findings if finding.code == "DIA002"]
+    assert len(told) == len(rows)
+    assert all(("the arm stood elsewhere" in one) == (len(rows) > 1) for one in told)
+
+
 def test_what_poses_share_is_no_more_than_scatter_can_be():
     base = fitted(campaign_of(stated(), 20, shared=20 * SIGMA))
     assert base.weights.shared > 10 * SIGMA
@@ -483,7 +499,7 @@ def test_half_an_explanation_names_nobody(monkeypatch):
     half = diagnosed(2.0, 1.0, 3.0)
     assert (half.verdict.word, half.verdict.named, half.agreed) == ("unknown", (), False)
     assert [why for _, why in half.verdict.rejected] == [ONLY_TOGETHER] * 2
-    assert half.final.model.terms == half.base.model.terms
+    assert [t.effect.name for t in half.final.model.terms] == ["joint_compliance"]
     good = diagnosed(1.0, 2.0, 3.0)
     assert (good.verdict.word, len(good.verdict.named)) == ("ambiguous", 2)
     assert good.verdict.rejected == ()
