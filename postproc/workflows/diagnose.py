@@ -188,8 +188,8 @@ def gross_errors(final: Fit) -> tuple[Outlier, ...]:
 
 
 def poses_off(campaign: Campaign, several: Sequence[Outlier]) -> Ints:
-    """Numbers (K,) of poses at which more than one reading is off: of one a beam may be broken, but where others say the
-    same the arm stood elsewhere."""
+    """Numbers (K,) of poses at which more than one reading is off: of one a beam may be broken, but where others say
+    the same the arm stood elsewhere."""
     pose = campaign.pose[[one.row for one in several]]
     return np.flatnonzero(np.bincount(pose, minlength=1) > 1)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,13 +14,19 @@ from postproc.base.units import DEG
 from postproc.diagnosis.candidate_fits import composed, with_effects
 from postproc.diagnosis.candidates import Candidate
 from postproc.diagnosis.diagnosis import Diagnosis
-from postproc.experiments.candidate_setups import CandidateSetups, readings_of, spacings, usable_limits
+from postproc.experiments.candidate_setups import (
+    CandidateSetups,
+    Setups,
+    readings_of,
+    spacings,
+    usable_limits,
+)
 from postproc.experiments.discrimination import KnownReadings, apart
 from postproc.experiments.measuring_order import measuring_order
 from postproc.identification.fit import Fit
 from postproc.identification.unknowns import Unknown
 from postproc.measurements import Readings
-from postproc.model import STANDARD_GRAVITY, approach
+from postproc.model import STANDARD_GRAVITY, StiffnessModel, approach
 from postproc.report.diagnosed import HANGS, NextPoses
 from postproc.report.diagnosed_words import SETTLES
 from postproc.workflows.identify import Measured
@@ -58,11 +65,12 @@ def next_poses(measured: Measured, diagnosis: Diagnosis, payload: float, pulls: 
     narrow = replace(offer, limits=_measured_ranges(measured.readings.q, offer.limits))
     if measured.readings.deflection and not len(offer.loads) + len(offer.pulls):
         return None  # what can be hung or pulled with is not known
-    pairs = [(first, other) for first, *others in diagnosis.verdict.alternatives for other in others[:TRIED]]
+    sets = [(first, others[:TRIED]) for first, *others in diagnosis.verdict.alternatives]
     # poses that differ less are better than none
     for offered in (narrow, offer, replace(offer, spread=0.0)):
-        tried = [_discriminating_poses(measured, diagnosis, offered, one, other) for one, other in pairs]
-        plans = [plan for plan in tried if plan]
+        plans = [
+            plan for first, others in sets for plan in _plans(measured, diagnosis, offered, first, others)
+        ]
         best = max(plans, key=lambda plan: min(plan.separation), default=None)
         if best is not None and (min(best.separation) >= SETTLES or offered is not narrow):
             return replace(best, beyond=_beyond(measured, best, narrow.limits))
@@ -85,12 +93,82 @@ def _beyond(measured: Measured, plan: NextPoses, ranges: Floats) -> tuple[str, .
     return tuple(measured.robot.joints[i].name for i in out)
 
 
-def _discriminating_poses(
-    measured: Measured, diagnosis: Diagnosis, candidates: CandidateSetups, one: Candidate, other: Candidate
-) -> NextPoses | None:
+def _plans(
+    measured: Measured,
+    diagnosis: Diagnosis,
+    candidates: CandidateSetups,
+    first: Candidate,
+    others: Sequence[Candidate],
+) -> list[NextPoses]:
+    """A plan for each of the ``others``; or one for all, where as many poses, a part for each, settle all."""
+    models = [_both(diagnosis, candidates, first, other) for other in others]
+
+    def poses(pair: ExplanationPair, count: int, aside: int = 0) -> tuple[Setups, tuple[float, float]] | None:
+        """``count`` of them, other ones of another seed, ``aside``."""
+        try:
+            found = apart(
+                pair.model,
+                pair.first,
+                pair.second,
+                pair.common,
+                candidates,
+                (count,),
+                seed=1 + aside,
+                candidates=CANDIDATES,
+                before=pair.known,
+            )
+        except Refusal:
+            return None
+        return found.chosen[count], found.separation[count]
+
+    def plan(
+        pair: ExplanationPair, other: Candidate, setups: Setups, separation: tuple[float, float]
+    ) -> NextPoses:
+        setups = setups[measuring_order(setups.q, spacings(measured.robot, candidates.spacing))]
+        return NextPoses(
+            _like(measured, readings_of(pair.model, candidates, setups)), (first, other), separation
+        )
+
+    entries = [(pair, other) for pair, other in zip(models, others, strict=True) if pair is not None]
+    if len(entries) > 1:
+        parts = [poses(pair, NEXT // len(entries), k) for k, (pair, _) in enumerate(entries)]
+        each = [part for part in parts if part is not None]
+        least = [min(separation) for _, separation in each]
+        if len(each) == len(entries) and min(least) >= SETTLES:
+            together, *further = (setups for setups, _ in each)
+            for more in further:
+                together = together + more
+            nearest = int(np.argmin(least))
+            return [plan(*entries[nearest], together, each[nearest][1])]
+    alone = [(pair, other, poses(pair, NEXT)) for pair, other in entries]
+    return [
+        plan(pair, other, *found)
+        for pair, other, found in alone
+        if found is not None and min(found[1]) >= HARDLY
+    ]
+
+
+class ExplanationPair(NamedTuple):
+    """Two explanations as the unknowns ``first`` and ``second`` of one ``model``, ``common`` ones beside, and what was
+    read."""
+
+    model: StiffnessModel
+    first: tuple[Unknown, ...]
+    second: tuple[Unknown, ...]
+    common: list[Unknown]
+    known: KnownReadings
+
+
+def _both(
+    diagnosis: Diagnosis, candidates: CandidateSetups, one: Candidate, other: Candidate
+) -> ExplanationPair | None:
+    """The model with both, each as large as it was fitted; None where the other one has no equilibrium."""
     search = diagnosis.search
     base, rest = search.base, [c for c in search.chosen if c.key != one.key]
-    there = with_effects(base.campaign, base, [other, *rest], exact=False)
+    try:
+        there = with_effects(base.campaign, base, [other, *rest], exact=False)
+    except Refusal:
+        return None
     model, first = composed(base.model, [one])
     model, second = composed(model, [other])
     model, beside = composed(model, rest)
@@ -103,17 +181,7 @@ def _discriminating_poses(
     scale = float(np.median(search.final.noise.sigma)) / candidates.sigma
     weights = replace(weights, weight=weights.weight * scale, shared=candidates.shared)
     known = KnownReadings(base.campaign, search.final.point.nuisances, weights)
-    try:
-        poses = apart(model, first, second, common, candidates, (NEXT,), candidates=CANDIDATES, before=known)
-    except Refusal:
-        return None
-    if min(poses.separation[NEXT]) < HARDLY:
-        return None
-    setups = poses.chosen[NEXT]
-    setups = setups[measuring_order(setups.q, spacings(measured.robot, candidates.spacing))]
-    return NextPoses(
-        _like(measured, readings_of(model, candidates, setups)), (one, other), poses.separation[NEXT]
-    )
+    return ExplanationPair(model, first, second, common, known)
 
 
 def _like(measured: Measured, planned: Readings) -> Readings:
