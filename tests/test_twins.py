@@ -87,3 +87,31 @@ def test_no_pose_and_no_load_separates_twins(pulled):
     expected = TWINS | TURNED if pulled else TWINS
     assert {triple for triple, share in shares.items() if share < SAME} == expected
     assert {triple for triple, share in shares.items() if share < APART} == expected
+
+
+@pytest.mark.parametrize("pulled", [False, True])
+def test_tilts_of_a_wrist_are_one_class_beside_the_springs_of_its_joints(pulled):
+    """Two springs across each other, as stiff as each other, give way alike in every direction of their plane: so
+    the tilt of A5 is one of A6 and other springs of A4 and A6.  Beside these, fitted too, no load separates it."""
+    rng = np.random.default_rng(1)
+    q = rng.uniform(*robot("kuka_kr270").limits.T, (300, 6))
+    wrench = np.zeros((300, 6))
+    wrench[:, 2] = -rng.uniform(500.0, 2600.0, 300)
+    if pulled:
+        wrench = rng.normal(size=(300, 6)) * np.repeat([1000.0, 300.0], 3)
+    found = deflections(q, wrench)
+    springs = {
+        name: c
+        for (effect, _), own in found.items()
+        if effect == "joint_compliance"
+        for name, c in own.items()
+    }
+    beside = {key: own | springs for key, own in found.items() if key[0] == "link_compliance"}
+    shares = {
+        (name, other[1]): share
+        for (effect, name, other), share in alike(beside).items()
+        if name in ("c2y", "c3x", "c3y", "c4x", "c4y", "c5x", "c6x")
+    }
+    same = {("c5x", "A4"), ("c5x", "A6"), ("c6x", "A4"), ("c6x", "A5")}
+    assert {pair for pair, share in shares.items() if share < SAME} == same
+    assert {pair for pair, share in shares.items() if share < APART} == same
