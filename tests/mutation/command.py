@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import compileall
 import json
 import math
 import os
@@ -11,10 +10,10 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from mutation import covered, judging
+from mutation import judging, stream
 from mutation.mutants import Mutant, mutants, sample
 
 HOME = Path(__file__).parent.parent.parent
@@ -69,44 +68,40 @@ def tree_of(folder: Path, revision: str) -> Path:
     return tree
 
 
-def cover_of(folder: Path, tree: Path, words: list[str]) -> covered.Cover:
-    """What the suite covers, or those of its files whose names hold one of ``words``; measured once a folder."""
-    kept = folder / "cover.json"
-    if not kept.exists():
-        compileall.compile_dir(tree, quiet=1)
-        pid = os.fork()  # the tests' modules stay out of this process
-        if pid == 0:
-            code = 1
-            try:
-                judging.stay(tree)
-                sys.dont_write_bytecode = False  # read by every judgement
-                tests = [
-                    str(path.relative_to(tree))
-                    for path in sorted((tree / "tests").glob("test_*.py"))
-                    if not any(word in path.name for word in SLOW)
-                    and (not words or any(word in path.name for word in words))
-                ]
-                covered.cover(tree, [folders[0] for folders in ROOMS.values()], tests).save(kept)
-                code = 0
-            finally:
-                os._exit(code)
-        if os.waitpid(pid, 0)[1]:
-            raise RuntimeError("the tests could not be measured")
-    return covered.load(kept)
+def tests_of(tree: Path, words: list[str], without: list[str]) -> list[str]:
+    """Files of tests whose names hold one of ``words``, where there are any, and none of ``without``."""
+    return [
+        str(path.relative_to(tree))
+        for path in sorted((tree / "tests").glob("test_*.py"))
+        if not any(word in path.name for word in [*SLOW, *without])
+        and (not words or any(word in path.name for word in words))
+    ]
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A mutant of a sample: the file's text with it, and the line before and after."""
+
+    room: str
+    mutant: Mutant
+    text: str
+    before: str
+    after: str
 
 
 class Judge:
-    """Judges mutants in a tree; tests that killed before come earlier."""
+    """Judges mutants in a tree, one at a time; tests that killed before come earlier."""
 
-    def __init__(self, folder: Path, tree: Path, cover: covered.Cover, seconds: float) -> None:
-        self.folder, self.tree, self.cover, self.seconds = folder, tree, cover, seconds
+    def __init__(self, folder: Path, tree: Path, seen: stream.Stream, seconds: float, tier: str) -> None:
+        self.folder, self.tree, self.seen, self.seconds, self.tier = folder, tree, seen, seconds, tier
         self.kills: dict[str, int] = {}
+        for _, test in seen.killed.values():
+            self.kills[test] = self.kills.get(test, 0) + 1
 
-    def rounds(self, mutant: Mutant) -> list[dict[str, float]]:
-        """Tests that reach the mutant, cheap ones and old killers first: a first round and the rest."""
-        cost = self.cover.seconds
-        names = self.cover.reaching(mutant.path, mutant.first_line, mutant.line)
-        names.sort(key=lambda name: (cost[name] + 0.02) / (1 + self.kills.get(name, 0)))
+    def rounds(self, names: list[str]) -> list[dict[str, float]]:
+        """The tests, cheap ones and old killers first: a first round and the rest."""
+        cost = self.seen.seconds
+        names = sorted(names, key=lambda name: (cost[name] + 0.02) / (1 + self.kills.get(name, 0)))
         first: dict[str, float] = {}
         rest: dict[str, float] = {}
         spent = 0.0
@@ -118,15 +113,15 @@ class Judge:
                 rest[name] = cost[name]
         return [tests for tests in (first, rest) if tests]
 
-    def judge(self, mutant: Mutant, text: str) -> tuple[str, str]:
-        """The verdict and the test at which it fell."""
+    def judge(self, mutant: Mutant, text: str, names: list[str]) -> tuple[str, str]:
+        """The verdict, and the test at which it fell, of the tests that come by the mutant."""
         path = self.tree / mutant.path
         kept, stat = path.read_bytes(), path.stat()
         verdict, test = "not reached", ""
         try:
             path.write_text(text, encoding="utf-8")
-            for tests in self.rounds(mutant):
-                verdict, test = judging.judge(self.tree, tests, self.folder)
+            for tests in self.rounds(names):
+                verdict, test = judging.judge(self.tree, tests, self.folder, self.tier)
                 if verdict != "survived":
                     self.kills[test] = self.kills.get(test, 0) + 1
                     break
@@ -158,10 +153,25 @@ def row(name: str, total: int, results: list[dict]) -> str:
     )
 
 
+def drawn(tree: Path, rooms: list[str], size: int, seed: int) -> tuple[dict[str, int], list[Drawn]]:
+    """The number of mutants in each room, and a sample of each."""
+    totals, chosen = {}, []
+    for room in rooms:
+        files = sorted(
+            str(path.relative_to(tree)) for top in ROOMS[room] for path in (tree / top).rglob("*.py")
+        )
+        sources = {file: (tree / file).read_text(encoding="utf-8") for file in files}
+        found = [mutant for file in files for mutant in mutants(tree, file)]
+        totals[room] = len(found)
+        for mutant, text in sample(found, size, seed, sources):
+            chosen.append(Drawn(room, mutant, text, *changed(sources[mutant.path], text)))
+    return totals, chosen
+
+
 def main(words: list[str] | None = None) -> int:
-    """Judges samples; results stand in FOLDER/<room>-<seed>.jsonl, one mutant a line, and are taken up again."""
+    """Judges samples; results are in FOLDER/mutants.jsonl, one mutant a line, and what was done is not done again."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__)
-    parser.add_argument("folder", type=Path, help="for the revision's files, what tests cover, and results")
+    parser.add_argument("folder", type=Path, help="for the revision's files and for results, of one sample")
     parser.add_argument("--room", action="append", choices=sorted(ROOMS))
     parser.add_argument("--sample", type=int, default=250, metavar="N")
     parser.add_argument("--seed", type=int, default=1)
@@ -169,43 +179,43 @@ def main(words: list[str] | None = None) -> int:
         "--seconds", type=float, default=60.0, help="processor seconds of tests that one mutant meets"
     )
     parser.add_argument("--revision", default="HEAD")
-    parser.add_argument(
-        "--tests", nargs="*", default=[], metavar="WORD", help="only test files with such a word"
-    )
+    parser.add_argument("--tier", choices=("fast", "all"), default="fast", help="which tests")
+    parser.add_argument("--tests", nargs="*", default=[], metavar="WORD", help="only files with such a word")
+    parser.add_argument("--without", nargs="*", default=[], metavar="WORD", help="no files with such a word")
     asked = parser.parse_args(words)
     folder = asked.folder.resolve()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # the file that is mutated is put back
+    tier = judging.FAST if asked.tier == "fast" else judging.ALL
     tree = tree_of(folder, asked.revision)
-    judging.warm()
-    judge = Judge(folder, tree, cover_of(folder, tree, asked.tests), asked.seconds)
-    table = []
-    for room in asked.room or ["effects", "compensation", "krl", "gcode"]:
-        files = sorted(
-            str(path.relative_to(tree)) for top in ROOMS[room] for path in (tree / top).rglob("*.py")
+    judging.warm(tier)
+    rooms = asked.room or ["effects", "compensation", "krl", "gcode"]
+    totals, chosen = drawn(tree, rooms, asked.sample, asked.seed)
+    tests = stream.order(
+        tree, tests_of(tree, asked.tests, asked.without), [top for r in rooms for top in ROOMS[r]]
+    )
+    pairs = [(one.mutant, one.text) for one in chosen]
+    seen = stream.run(tree, pairs, tests, folder / "stream.jsonl", asked.seconds, tier)
+    judge = Judge(folder, tree, seen, asked.seconds, tier)
+    kept = folder / "mutants.jsonl"
+    known = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []
+    judged: list[dict] = known[:]
+    start = time.monotonic()
+    for number, one in list(enumerate(chosen))[len(known) :]:
+        verdict, test = seen.killed.get(number, ("", ""))
+        if not verdict:
+            verdict, test = judge.judge(one.mutant, one.text, seen.reached.get(number, []))
+            print(
+                f"{one.mutant.path}:{one.mutant.line} {verdict}, {time.monotonic() - start:.0f} s",
+                file=sys.stderr,
+            )
+        result = {"room": one.room, **asdict(one.mutant), "verdict": verdict, "test": test}
+        judged.append(
+            {**result, "tests": len(seen.reached.get(number, [])), "before": one.before, "after": one.after}
         )
-        sources = {file: (tree / file).read_text(encoding="utf-8") for file in files}
-        found = [mutant for file in files for mutant in mutants(tree, file)]
-        kept = folder / f"{room}-{asked.seed}.jsonl"
-        results = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []
-        known = {(one["path"], one["operator"], one["occurrence"]): one for one in results}
-        judged = []
-        start = time.monotonic()
-        for number, (mutant, text) in enumerate(sample(found, asked.sample, asked.seed, sources), 1):
-            one = known.get((mutant.path, mutant.operator, mutant.occurrence))
-            if one is None:
-                verdict, test = judge.judge(mutant, text)
-                before, after = changed(sources[mutant.path], text)
-                one = {**asdict(mutant), "verdict": verdict, "test": test, "before": before, "after": after}
-                with kept.open("a", encoding="utf-8") as out:
-                    out.write(json.dumps(one) + "\n")
-            judged.append(one)
-            if number % 10 == 0:
-                alive = sum(one["verdict"] in ("survived", "not reached") for one in judged)
-                print(
-                    f"{room}: {number} judged, {alive} alive, {time.monotonic() - start:.0f} s",
-                    file=sys.stderr,
-                )
-        table.append(row(room, len(found), judged))
+        with kept.open("a", encoding="utf-8") as out:
+            out.write(json.dumps(judged[-1]) + "\n")
+    print(f"{len(seen.seconds)} tests, {sum(seen.seconds.values()):.0f} s of the processor")
     print("room          mutants  sampled  killed  timeout  survived  not reached  killed % (95 %)")
-    print("\n".join(table))
+    for room in rooms:
+        print(row(room, totals[room], [one for one in judged if one["room"] == room]))
     return 0
