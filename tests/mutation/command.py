@@ -113,11 +113,17 @@ class Judge:
                 rest[name] = cost[name]
         return [tests for tests in (first, rest) if tests]
 
-    def judge(self, mutant: Mutant, text: str, names: list[str]) -> tuple[str, str]:
-        """The verdict, and the test at which it fell, of the tests that come by the mutant."""
+    def left_over(self, number: int) -> list[str]:
+        """Tests that come by a mutant, and that it has not met."""
+        return [
+            test for test in self.seen.reached.get(number, []) if test not in self.seen.met.get(number, ())
+        ]
+
+    def judge(self, mutant: Mutant, text: str, names: list[str], lived: bool = False) -> tuple[str, str]:
+        """The verdict, and the test at which it fell, of tests that come by the mutant; ``lived``: at others."""
         path = self.tree / mutant.path
         kept, stat = path.read_bytes(), path.stat()
-        verdict, test = "not reached", ""
+        verdict, test = "survived" if lived else "not reached", ""
         try:
             path.write_text(text, encoding="utf-8")
             for tests in self.rounds(names):
@@ -153,8 +159,13 @@ def row(name: str, total: int, results: list[dict]) -> str:
     )
 
 
-def drawn(tree: Path, rooms: list[str], size: int, seed: int) -> tuple[dict[str, int], list[Drawn]]:
-    """The number of mutants in each room, and a sample of each."""
+def drawn(
+    tree: Path, rooms: list[str], size: int, seed: int, kept: Path
+) -> tuple[dict[str, int], list[Drawn]]:
+    """The number of mutants in each room, and a sample of each; drawn once a folder."""
+    if kept.exists():
+        read = json.loads(kept.read_text())
+        return read["totals"], [Drawn(**{**one, "mutant": Mutant(**one["mutant"])}) for one in read["chosen"]]
     totals, chosen = {}, []
     for room in rooms:
         files = sorted(
@@ -165,6 +176,7 @@ def drawn(tree: Path, rooms: list[str], size: int, seed: int) -> tuple[dict[str,
         totals[room] = len(found)
         for mutant, text in sample(found, size, seed, sources):
             chosen.append(Drawn(room, mutant, text, *changed(sources[mutant.path], text)))
+    kept.write_text(json.dumps({"totals": totals, "chosen": [asdict(one) for one in chosen]}))
     return totals, chosen
 
 
@@ -189,7 +201,7 @@ def main(words: list[str] | None = None) -> int:
     tree = tree_of(folder, asked.revision)
     judging.warm(tier)
     rooms = asked.room or ["effects", "compensation", "krl", "gcode"]
-    totals, chosen = drawn(tree, rooms, asked.sample, asked.seed)
+    totals, chosen = drawn(tree, rooms, asked.sample, asked.seed, folder / "drawn.json")
     tests = stream.order(
         tree, tests_of(tree, asked.tests, asked.without), [top for r in rooms for top in ROOMS[r]]
     )
@@ -203,7 +215,7 @@ def main(words: list[str] | None = None) -> int:
     for number, one in list(enumerate(chosen))[len(known) :]:
         verdict, test = seen.killed.get(number, ("", ""))
         if not verdict:
-            verdict, test = judge.judge(one.mutant, one.text, seen.reached.get(number, []))
+            verdict, test = judge.judge(one.mutant, one.text, judge.left_over(number), number in seen.met)
             print(
                 f"{one.mutant.path}:{one.mutant.line} {verdict}, {time.monotonic() - start:.0f} s",
                 file=sys.stderr,

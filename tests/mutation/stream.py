@@ -36,16 +36,17 @@ WALL_TIMES = 20.0
 """Seconds by the clock that a run may take, a processor second that it is given."""
 LIVES, FALLS, STAYS = 0, 1, 2
 """Exit codes of a run: STAYS, where the mutant could not be put in place."""
-NOT_HERE = "not in place"
+LIVED = "lived"
 
 
 @dataclass
 class Stream:
     """``seconds``: what each test takes that passes; ``reached``: number of a mutant -> tests that come by it;
-    ``killed``: number of a mutant -> (verdict, test)."""
+    ``met``: those at which it lived; ``killed``: number of a mutant -> (verdict, test)."""
 
     seconds: dict[str, float] = field(default_factory=dict)
     reached: dict[int, list[str]] = field(default_factory=dict)
+    met: dict[int, set[str]] = field(default_factory=dict)
     killed: dict[int, tuple[str, str]] = field(default_factory=dict)
 
     def add(self, line: dict[str, Any]) -> None:
@@ -53,6 +54,8 @@ class Stream:
         self.seconds[test] = line["seconds"]
         for number in line["reached"]:
             self.reached.setdefault(number, []).append(test)
+        for number in line["met"]:
+            self.met.setdefault(number, set()).add(test)
         for number, verdict in line["killed"]:
             self.killed[number] = verdict, test
 
@@ -132,23 +135,25 @@ class _Runner:
         result = yield
         seconds = time.process_time() - start
         self.probes.reached.turn(before)
-        line = {"test": item.nodeid, "seconds": seconds, "reached": [], "killed": []}
+        line = {"test": item.nodeid, "seconds": seconds, "reached": [], "met": [], "killed": []}
         if item.nodeid not in self.failed:
             of_file, of_run = self.prepared(item)
             imported = self.collected.get(item.nodeid.split("::")[0], set())
             line["reached"] = sorted(own | of_file | of_run | imported)
             if seconds <= DEAR_S:
                 for number in sorted(own | of_file):
-                    verdict = self.met(item, number, seconds, number in of_file)
-                    if verdict:
+                    verdict = self.meet(item, number, seconds, number in of_file)
+                    if verdict == LIVED:
+                        line["met"].append(number)
+                    elif verdict:
                         line["killed"].append((number, verdict))
         self.stream.add(line)
         with self.log.open("a", encoding="utf-8") as out:
             out.write(json.dumps(line) + "\n")
         return result
 
-    def met(self, item: pytest.Item, number: int, seconds: float, anew: bool) -> str:
-        """How a mutant fell to a test; empty where it lives, or was not asked."""
+    def meet(self, item: pytest.Item, number: int, seconds: float, anew: bool) -> str:
+        """How a mutant fares at a test; empty where it is not asked, or can not be put in place."""
         if (
             number in self.stream.killed
             or number in self.homeless
@@ -160,9 +165,9 @@ class _Runner:
         end = os.times()
         used = end.children_user + end.children_system - start.children_user - start.children_system
         self.spent[number] = self.spent.get(number, 0.0) + used
-        if verdict == NOT_HERE:
+        if not verdict:
             self.homeless.add(number)
-        return "" if verdict == NOT_HERE else verdict
+        return verdict
 
     def run(self, item: pytest.Item, number: int, seconds: float, anew: bool) -> str:
         sys.stdout.flush()
@@ -175,7 +180,7 @@ class _Runner:
             return "timeout"
         if os.WIFSIGNALED(status):
             return "timeout" if os.WTERMSIG(status) == signal.SIGPROF else "killed"
-        return {LIVES: "", STAYS: NOT_HERE}.get(os.WEXITSTATUS(status), "killed")
+        return {LIVES: LIVED, STAYS: ""}.get(os.WEXITSTATUS(status), "killed")
 
     def _child(self, item: Any, number: int, limit: float, anew: bool) -> None:
         """Never returns."""
