@@ -35,7 +35,7 @@ KINDS = {
 LEFT_OUT = {"RemoveDecorator", "VariableReplacer", "VariableInserter"}
 
 
-NO_OPERATORS = frozenset("( ) [ ] { } , . : ; = -> := @".split())
+NO_OPERATORS = frozenset(["(", ")", "[", "]", "{", "}", ",", ".", ":", ";", "=", "->", ":=", "@"])
 NO_PLACES = {
     *("name", "string", "fstring_start", "fstring_string", "fstring_end", "newline", "endmarker"),
     *("file_input", "suite", "simple_stmt", "expr_stmt", "return_stmt", "trailer", "atom", "atom_expr"),
