@@ -136,7 +136,7 @@ def test_one_run_finds_what_falls_to_which_test(tree, tmp_path):
     judging.warm(judging.FAST)
     chosen = [(one, text) for one in mutants(tree, "thing.py") if (text := one.text(SOURCE)) is not None]
     log = tmp_path / "stream.jsonl"
-    seen = stream.run(tree, chosen, ["tests/test_thing.py"], log, 30.0, judging.FAST)
+    seen = stream.run(tree, chosen, ["tests/test_thing.py"], log, judging.FAST)
     fixture, cached, none = (f"tests/test_thing.py::test_{word}" for word in ("fixture", "cached", "none"))
     assert list(seen.seconds) == [fixture, cached, none]
     verdicts, by_line = {}, {16: [none], 17: [fixture, cached]}
@@ -151,7 +151,7 @@ def test_one_run_finds_what_falls_to_which_test(tree, tmp_path):
     assert verdicts["return-2.0"] is None
     assert verdicts["size:int|None=3"] is None
     left = log.read_text()
-    assert stream.run(tree, chosen, ["tests/test_thing.py"], log, 30.0, judging.FAST) == seen
+    assert stream.run(tree, chosen, ["tests/test_thing.py"], log, judging.FAST) == seen
     assert log.read_text() == left
 
 

@@ -206,7 +206,7 @@ def main(words: list[str] | None = None) -> int:
         tree, tests_of(tree, asked.tests, asked.without), [top for r in rooms for top in ROOMS[r]]
     )
     pairs = [(one.mutant, one.text) for one in chosen]
-    seen = stream.run(tree, pairs, tests, folder / "stream.jsonl", asked.seconds, tier)
+    seen = stream.run(tree, pairs, tests, folder / "stream.jsonl", tier)
     judge = Judge(folder, tree, seen, asked.seconds, tier)
     kept = folder / "mutants.jsonl"
     known = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []

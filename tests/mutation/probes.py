@@ -10,9 +10,9 @@ from __future__ import annotations
 import ast
 import builtins
 import functools
-import inspect
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
@@ -177,31 +177,42 @@ def dotted(tree: ast.AST, function: Function) -> list[str]:
     return [function.name]
 
 
-def put_in_place(tree: Path, mutant: Mutant, text: str, source: str) -> bool:
-    """Gives the function that holds the mutant the mutated code, in this process; False where that can not be done."""
+@dataclass(frozen=True)
+class Swap:
+    """Functions of this process that hold a mutant, and the code that they have with it."""
+
+    functions: tuple[FunctionType, ...]
+    code: CodeType
+
+    def put_in_place(self) -> None:
+        for function in self.functions:
+            function.__code__ = self.code
+
+
+def swap_of(tree: Path, mutant: Mutant, text: str, source: str) -> Swap | None:
+    """How to put a mutant in place, in this process; None where that can not be done."""
     path = str(tree / mutant.path)
     parsed = ast.parse(source)
     column = len(source.splitlines()[mutant.line - 1][: mutant.column].encode())
     function = holder(parsed, mutant.line, column)
     if function is None:
-        return False
-    first = first_line(function)
+        return None
+    place = function.name, first_line(function)
     wanted = [
         code
         for code in codes(compile(text, path, "exec", dont_inherit=True))
-        if (code.co_name, code.co_firstlineno) == (function.name, first)
+        if (code.co_name, code.co_firstlineno) == place
     ]
     module = next((one for one in list(sys.modules.values()) if getattr(one, "__file__", None) == path), None)
     if module is None or len(wanted) != 1:
-        return False
-    done = False
-    for live in functions_of(module, dotted(parsed, function)):
-        inner = inspect.unwrap(live).__code__ if not hasattr(live, "__code__") else live.__code__
-        same = (inner.co_name, inner.co_firstlineno, inner.co_freevars)
-        if same == (function.name, first, wanted[0].co_freevars):
-            live.__code__ = wanted[0]
-            done = True
-    return done
+        return None
+    live = [
+        one
+        for one in functions_of(module, dotted(parsed, function))
+        if (one.__code__.co_name, one.__code__.co_firstlineno) == place
+        and one.__code__.co_freevars == wanted[0].co_freevars
+    ]
+    return Swap(tuple(live), wanted[0]) if live else None
 
 
 def forget_results(tree: Path) -> None:

@@ -1,7 +1,7 @@
 """All mutants in one run of the tests: each test is run as it is, and then once more for each mutant that it comes by.
 
 Imports, collection and what fixtures prepare are paid once for all.  The further runs are processes forked where the
-test has just passed, in which the function that holds the mutant has the mutated code (``probes.put_in_place``); what a
+test has just passed, in which the function that holds the mutant has the mutated code (``probes.swap_of``); what a
 fixture of a wider scope reaches is prepared anew there.  A mutant that falls meets no further test.
 
 What is left to a judgement of its own (``judging``): mutants of what runs at import, and those that no test here kills;
@@ -17,6 +17,7 @@ import resource
 import signal
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,14 +29,18 @@ from _pytest.runner import runtestprotocol
 
 from mutation import judging
 from mutation.mutants import Mutant
-from mutation.probes import Probes, forget_results, put_in_place
+from mutation.probes import Probes, Swap, forget_results, swap_of
 
 DEAR_S = 2.0
 """A test of more processor seconds meets mutants later, if these still live."""
 WALL_TIMES = 20.0
 """Seconds by the clock that a run may take, a processor second that it is given."""
-LIVES, FALLS, STAYS = 0, 1, 2
-"""Exit codes of a run: STAYS, where the mutant could not be put in place."""
+LIVES, FALLS = 0, 1
+"""Exit codes of a run."""
+OF_FUNCTION = 2
+"""Parametrisations of a test that a mutant meets here: the others are left over."""
+BUDGET_S = 4.0
+"""Processor seconds of these runs that a mutant may take: a judgement of its own then costs less."""
 LIVED = "lived"
 
 
@@ -71,10 +76,8 @@ def load(path: Path) -> Stream:
 class _Runner:
     """The plug-in of pytest that runs tests again for mutants."""
 
-    def __init__(
-        self, tree: Path, mutants: Sequence[tuple[Mutant, str]], probes: Probes, log: Path, budget: float
-    ) -> None:
-        self.tree, self.mutants, self.probes, self.log, self.budget = tree, mutants, probes, log, budget
+    def __init__(self, tree: Path, mutants: Sequence[tuple[Mutant, str]], probes: Probes, log: Path) -> None:
+        self.tree, self.mutants, self.probes, self.log = tree, mutants, probes, log
         self.stream = load(log)
         self.sources = {mutant.path: (tree / mutant.path).read_text() for mutant, _ in mutants}
         self.fixtures: dict[int, set[int]] = {}
@@ -83,7 +86,8 @@ class _Runner:
         """File of tests -> what its import comes by."""
         self.failed: set[str] = set()
         self.spent: dict[int, float] = {}
-        self.homeless: set[int] = set()
+        self.swaps: dict[int, Swap | None] = {}
+        self.functions: Counter[tuple[int, str]] = Counter()
         self.start = time.monotonic()
 
     # -- which mutants a test comes by -----------------------------------------------------------------------------
@@ -154,58 +158,57 @@ class _Runner:
 
     def meet(self, item: pytest.Item, number: int, seconds: float, anew: bool) -> str:
         """How a mutant fares at a test; empty where it is not asked, or can not be put in place."""
-        if (
-            number in self.stream.killed
-            or number in self.homeless
-            or self.spent.get(number, 0.0) > self.budget
-        ):
+        function = number, item.nodeid.partition("[")[0]
+        if number in self.stream.killed or self.spent.get(number, 0.0) > BUDGET_S:
             return ""
+        if number not in self.swaps:
+            mutant, text = self.mutants[number]
+            self.swaps[number] = swap_of(self.tree, mutant, text, self.sources[mutant.path])
+        swap = self.swaps[number]
+        if swap is None or self.functions[function] >= OF_FUNCTION:
+            return ""
+        self.functions[function] += 1
         start = os.times()
-        verdict = self.run(item, number, seconds, anew)
+        verdict = self.run(item, swap, seconds, anew)
         end = os.times()
         used = end.children_user + end.children_system - start.children_user - start.children_system
         self.spent[number] = self.spent.get(number, 0.0) + used
-        if not verdict:
-            self.homeless.add(number)
         return verdict
 
-    def run(self, item: pytest.Item, number: int, seconds: float, anew: bool) -> str:
+    def run(self, item: pytest.Item, swap: Swap, seconds: float, anew: bool) -> str:
         sys.stdout.flush()
         limit = judging.LIMIT_S + judging.LIMIT_TIMES * seconds
         pid = os.fork()
         if pid == 0:
-            self._child(item, number, limit, anew)
+            self._child(item, swap, limit, anew)
         status = judging.wait(pid, WALL_TIMES * limit)
         if status is None:
             return "timeout"
         if os.WIFSIGNALED(status):
             return "timeout" if os.WTERMSIG(status) == signal.SIGPROF else "killed"
-        return {LIVES: LIVED, STAYS: ""}.get(os.WEXITSTATUS(status), "killed")
+        return LIVED if os.WEXITSTATUS(status) == LIVES else "killed"
 
-    def _child(self, item: Any, number: int, limit: float, anew: bool) -> None:
+    def _child(self, item: Any, swap: Swap, limit: float, anew: bool) -> None:
         """Never returns."""
-        code = STAYS
+        code = FALLS
         try:
             os.setsid()
             resource.setrlimit(resource.RLIMIT_AS, (judging.MEMORY, judging.MEMORY))
             signal.signal(signal.SIGPROF, signal.SIG_DFL)
             signal.setitimer(signal.ITIMER_PROF, limit)
-            mutant, text = self.mutants[number]
-            if put_in_place(self.tree, mutant, text, self.sources[mutant.path]):
-                forget_results(self.tree)
-                code = FALLS
-                chain = item.listchain()
-                if anew:
-                    kept = [
-                        one
-                        for one in chain
-                        if not isinstance(one, pytest.Module | pytest.Class | pytest.Item)
-                    ]
-                    item.session._setupstate.teardown_exact(SimpleNamespace(listchain=lambda: kept))
-                item._initrequest()
-                following = SimpleNamespace(listchain=lambda: chain[:-1])
-                reports = runtestprotocol(item, log=False, nextitem=following)
-                code = FALLS if any(report.failed for report in reports) else LIVES
+            gc.disable()
+            swap.put_in_place()
+            forget_results(self.tree)
+            chain = item.listchain()
+            if anew:
+                kept = [
+                    one for one in chain if not isinstance(one, pytest.Module | pytest.Class | pytest.Item)
+                ]
+                item.session._setupstate.teardown_exact(SimpleNamespace(listchain=lambda: kept))
+            item._initrequest()
+            following = SimpleNamespace(listchain=lambda: chain[:-1])
+            reports = runtestprotocol(item, log=False, nextitem=following)
+            code = FALLS if any(report.failed for report in reports) else LIVES
         finally:
             os._exit(code)
 
@@ -225,7 +228,6 @@ def run(
     mutants: Sequence[tuple[Mutant, str]],
     tests: Sequence[str],
     log: Path,
-    budget: float,
     tier: str,
 ) -> Stream:
     """Runs files of tests in a process of its own.  A run that was stopped goes on where it was."""
@@ -241,7 +243,7 @@ def run(
             probes = Probes(tree, [mutant for mutant, _ in mutants])
             probes.install()
             os.environ["POSTPROC_THREADS"] = "1"  # a fork takes one thread along
-            plugin = _Runner(tree, mutants, probes, log, budget)
+            plugin = _Runner(tree, mutants, probes, log)
             options = [*judging.OPTIONS, "--hypothesis-profile", judging.PROFILE, "-m", tier]
             code = int(pytest.main([*tests, *options], plugins=[plugin]))
         finally:
