@@ -5,7 +5,7 @@ import pytest
 pytest.importorskip("cosmic_ray", reason="pip install .[mutation]")
 
 from mutation import judging, stream
-from mutation.command import Judge, changed, row, wilson
+from mutation.command import changed, judge, row, wilson
 from mutation.mutants import mutants, sample
 from mutation.probes import NOTE, with_probes
 
@@ -136,39 +136,39 @@ def test_one_run_finds_what_falls_to_which_test(tree, tmp_path):
     judging.warm(judging.FAST)
     chosen = [(one, text) for one in mutants(tree, "thing.py") if (text := one.text(SOURCE)) is not None]
     log = tmp_path / "stream.jsonl"
-    seen = stream.run(tree, chosen, ["tests/test_thing.py"], log, judging.FAST)
+    seen = stream.run(tree, chosen, ["tests/test_thing.py"], log, 30.0, judging.FAST)
     fixture, cached, none = (f"tests/test_thing.py::test_{word}" for word in ("fixture", "cached", "none"))
     assert list(seen.seconds) == [fixture, cached, none]
     verdicts, by_line = {}, {16: [none], 17: [fixture, cached]}
     for number, (mutant, text) in enumerate(chosen):
         after = changed(SOURCE, text)[1].replace(" ", "")
-        verdicts[after] = seen.killed.get(number)
+        verdicts[after] = seen.verdicts.get(number)
         assert seen.reached[number] == by_line.get(mutant.line, [fixture, cached, none])
-    assert verdicts["returnthing.size-by*len(list(pairs))"] == ("killed", fixture)
-    assert verdicts["ifthingisnotNoneornotby>0:"] == ("killed", fixture)
+    assert verdicts["returnthing.size-by*len(list(pairs))"] in (("killed", fixture), ("killed", cached))
+    assert verdicts["ifthingisnotNoneornotby>0:"][0] == "killed"
     assert verdicts["ifthingisNoneornotby>1:"] == ("killed", cached)
     assert verdicts["return+1.0"] == ("killed", none)
-    assert verdicts["return-2.0"] is None
+    assert verdicts["return-2.0"] == ("survived", "")
     assert verdicts["size:int|None=3"] is None
     left = log.read_text()
-    assert stream.run(tree, chosen, ["tests/test_thing.py"], log, judging.FAST) == seen
+    assert stream.run(tree, chosen, ["tests/test_thing.py"], log, 30.0, judging.FAST) == seen
     assert log.read_text() == left
 
 
 @pytest.mark.slow
 def test_mutants_fall_by_the_tests_that_reach_them(tree, tmp_path):
     """And the tree is afterwards what it was, with nothing left of them."""
-    quick, slow, far = (f"tests/test_thing.py::test_{word}" for word in ("quick", "slow", "far"))
-    lines = {14: [quick, slow], 15: [quick, slow], 16: [quick], 17: [slow]}
-    seen = stream.Stream(seconds={quick: 0.01, slow: 0.02, far: 0.01})
+    quick, slow = (f"tests/test_thing.py::test_{word}" for word in ("quick", "slow"))
+    reached = {15: [quick, slow], 16: [quick], 17: [slow]}
     stat = (tree / "thing.py").stat()
-    judge = Judge(tmp_path, tree, seen, 10.0, judging.ALL)
     verdicts = {}
     for mutant in mutants(tree, "thing.py"):
         text = mutant.text(SOURCE)
-        if text is not None and mutant.line in (15, 16, 17):
+        if text is not None and mutant.line in reached:
             after = changed(SOURCE, text)[1].replace(" ", "")
-            verdicts[after] = judge.judge(mutant, text, lines[mutant.line])
+            tests = dict.fromkeys(reached[mutant.line], 0.01)
+            verdicts[after] = judge(tmp_path, tree, mutant, text, tests, judging.ALL)
+    assert judge(tmp_path, tree, mutant, SOURCE, {}, judging.ALL) == ("not reached", "")
     assert verdicts["returnthing.size-by*len(list(pairs))"] == ("killed", slow)
     assert verdicts["return-2.0"] == ("survived", "")
     assert verdicts["return+1.0"] == ("killed", quick)
@@ -176,6 +176,16 @@ def test_mutants_fall_by_the_tests_that_reach_them(tree, tmp_path):
     assert (tree / "thing.py").read_text() == SOURCE
     assert (tree / "thing.py").stat().st_mtime_ns == stat.st_mtime_ns
     assert not list((tree / "__pycache__").glob("thing*")) if (tree / "__pycache__").exists() else True
+
+
+def test_quick_tests_and_those_that_killed_come_first():
+    seen = stream.Stream(seconds={"a": 1.0, "b": 0.5, "c": 9.0, "d": 2.0}, reached={0: ["a", "b", "c", "d"]})
+    assert list(seen.choice(0, 4.0)) == ["b", "a", "d"]
+    assert list(seen.choice(1, 4.0)) == []
+    for number in (5, 6):
+        seen.add({"mutant": number, "verdict": "killed", "test": "a"})
+    assert list(seen.choice(0, 1.2)) == ["a"]
+    assert list(seen.choice(0, 0.1)) == ["a"]
 
 
 def test_what_hangs_is_a_timeout(tree, tmp_path, monkeypatch):

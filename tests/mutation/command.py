@@ -9,7 +9,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -34,8 +33,6 @@ SLOW = (  # browsers, hundreds of processes, thousands of programs: a mutant is 
     "fuzz",
     "rs274",
 )
-FIRST_S = 3.0
-"""Processor seconds of tests that a mutant meets first: most fall at once."""
 Z = 1.959963984540054
 """Two-sided 95 % of the normal distribution."""
 
@@ -89,52 +86,22 @@ class Drawn:
     after: str
 
 
-class Judge:
-    """Judges mutants in a tree, one at a time; tests that killed before come earlier."""
-
-    def __init__(self, folder: Path, tree: Path, seen: stream.Stream, seconds: float, tier: str) -> None:
-        self.folder, self.tree, self.seen, self.seconds, self.tier = folder, tree, seen, seconds, tier
-        self.kills: dict[str, int] = {}
-        for _, test in seen.killed.values():
-            self.kills[test] = self.kills.get(test, 0) + 1
-
-    def rounds(self, names: list[str]) -> list[dict[str, float]]:
-        """The tests, cheap ones and old killers first: a first round and the rest."""
-        cost = self.seen.seconds
-        names = sorted(names, key=lambda name: (cost[name] + 0.02) / (1 + self.kills.get(name, 0)))
-        first: dict[str, float] = {}
-        rest: dict[str, float] = {}
-        spent = 0.0
-        for name in names:
-            spent += cost[name]
-            if spent <= FIRST_S or not first:
-                first[name] = cost[name]
-            elif spent <= self.seconds:
-                rest[name] = cost[name]
-        return [tests for tests in (first, rest) if tests]
-
-    def left_over(self, number: int) -> list[str]:
-        """Tests that come by a mutant, and that it has not met."""
-        return [
-            test for test in self.seen.reached.get(number, []) if test not in self.seen.met.get(number, ())
-        ]
-
-    def judge(self, mutant: Mutant, text: str, names: list[str], lived: bool = False) -> tuple[str, str]:
-        """The verdict, and the test at which it fell, of tests that come by the mutant; ``lived``: at others."""
-        path = self.tree / mutant.path
-        kept, stat = path.read_bytes(), path.stat()
-        verdict, test = "survived" if lived else "not reached", ""
-        try:
-            path.write_text(text, encoding="utf-8")
-            for tests in self.rounds(names):
-                verdict, test = judging.judge(self.tree, tests, self.folder, self.tier)
-                if verdict != "survived":
-                    self.kills[test] = self.kills.get(test, 0) + 1
-                    break
-        finally:
-            path.write_bytes(kept)
-            os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
-        return verdict, test if verdict != "survived" else ""
+def judge(
+    folder: Path, tree: Path, mutant: Mutant, text: str, tests: dict[str, float], tier: str
+) -> tuple[str, str]:
+    """The verdict, and the test at which it fell, of tests (with their seconds, in their order) that come by a mutant;
+    the mutant is written into the tree, and all is imported anew."""
+    if not tests:
+        return "not reached", ""
+    path = tree / mutant.path
+    kept, stat = path.read_bytes(), path.stat()
+    try:
+        path.write_text(text, encoding="utf-8")
+        verdict, test = judging.judge(tree, tests, folder, tier)
+    finally:
+        path.write_bytes(kept)
+        os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+    return verdict, test if verdict != "survived" else ""
 
 
 def changed(before: str, after: str) -> tuple[str, str]:
@@ -181,7 +148,7 @@ def drawn(
 
 
 def main(words: list[str] | None = None) -> int:
-    """Judges samples; results are in FOLDER/mutants.jsonl, one mutant a line, and what was done is not done again."""
+    """Judges samples; results are in FOLDER/mutants.jsonl, one mutant a line; a run that was stopped goes on."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__)
     parser.add_argument("folder", type=Path, help="for the revision's files and for results, of one sample")
     parser.add_argument("--room", action="append", choices=sorted(ROOMS))
@@ -194,6 +161,7 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--tier", choices=("fast", "all"), default="fast", help="which tests")
     parser.add_argument("--tests", nargs="*", default=[], metavar="WORD", help="only files with such a word")
     parser.add_argument("--without", nargs="*", default=[], metavar="WORD", help="no files with such a word")
+    parser.add_argument("--near", action="store_true", help="only files that import what is in the rooms")
     asked = parser.parse_args(words)
     folder = asked.folder.resolve()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # the file that is mutated is put back
@@ -202,32 +170,31 @@ def main(words: list[str] | None = None) -> int:
     judging.warm(tier)
     rooms = asked.room or ["effects", "compensation", "krl", "gcode"]
     totals, chosen = drawn(tree, rooms, asked.sample, asked.seed, folder / "drawn.json")
-    tests = stream.order(
-        tree, tests_of(tree, asked.tests, asked.without), [top for r in rooms for top in ROOMS[r]]
-    )
+    tests = tests_of(tree, asked.tests, asked.without)
+    if asked.near:
+        tests = [
+            test for test in tests if stream.is_near(tree, test, [top for r in rooms for top in ROOMS[r]])
+        ]
     pairs = [(one.mutant, one.text) for one in chosen]
-    seen = stream.run(tree, pairs, tests, folder / "stream.jsonl", tier)
-    judge = Judge(folder, tree, seen, asked.seconds, tier)
-    kept = folder / "mutants.jsonl"
-    known = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []
-    judged: list[dict] = known[:]
-    start = time.monotonic()
-    for number, one in list(enumerate(chosen))[len(known) :]:
-        verdict, test = seen.killed.get(number, ("", ""))
-        if not verdict:
-            verdict, test = judge.judge(one.mutant, one.text, judge.left_over(number), number in seen.met)
-            print(
-                f"{one.mutant.path}:{one.mutant.line} {verdict}, {time.monotonic() - start:.0f} s",
-                file=sys.stderr,
+    log = folder / "stream.jsonl"
+    seen = stream.run(tree, pairs, tests, log, asked.seconds, tier)
+    results = []
+    for number, one in enumerate(chosen):
+        if number not in seen.verdicts:
+            verdict, test = judge(
+                folder, tree, one.mutant, one.text, seen.choice(number, asked.seconds), tier
             )
+            line = {"mutant": number, "verdict": verdict, "test": test}
+            seen.add(line)
+            with log.open("a", encoding="utf-8") as out:
+                out.write(json.dumps(line) + "\n")
+        verdict, test = seen.verdicts[number]
         result = {"room": one.room, **asdict(one.mutant), "verdict": verdict, "test": test}
-        judged.append(
-            {**result, "tests": len(seen.reached.get(number, [])), "before": one.before, "after": one.after}
-        )
-        with kept.open("a", encoding="utf-8") as out:
-            out.write(json.dumps(judged[-1]) + "\n")
+        tests_met = len(seen.choice(number, asked.seconds))
+        results.append({**result, "tests": tests_met, "before": one.before, "after": one.after})
+    (folder / "mutants.jsonl").write_text("".join(json.dumps(one) + "\n" for one in results))
     print(f"{len(seen.seconds)} tests, {sum(seen.seconds.values()):.0f} s of the processor")
     print("room          mutants  sampled  killed  timeout  survived  not reached  killed % (95 %)")
     for room in rooms:
-        print(row(room, totals[room], [one for one in judged if one["room"] == room]))
+        print(row(room, totals[room], [one for one in results if one["room"] == room]))
     return 0

@@ -92,6 +92,11 @@ def wait(pid: int, seconds: float | None) -> int | None:
     return status if done else None
 
 
+def limit(seconds: float) -> float:
+    """Processor seconds that a test may take which takes ``seconds`` unmutated."""
+    return LIMIT_S + LIMIT_TIMES * seconds
+
+
 class _Chosen:
     """Runs the chosen tests, in the given order, each with a limit; notes the first that fails."""
 
@@ -108,7 +113,7 @@ class _Chosen:
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
         self.note.write_text(item.nodeid)
-        signal.setitimer(signal.ITIMER_PROF, LIMIT_S + LIMIT_TIMES * self.seconds[item.nodeid])
+        signal.setitimer(signal.ITIMER_PROF, limit(self.seconds[item.nodeid]))
         return (yield)
 
 
@@ -154,12 +159,15 @@ def judge(tree: Path, seconds: dict[str, float], folder: Path, tier: str = ALL) 
     return verdict(status, words) if status is not None else "timeout", note.read_text()
 
 
-def verdict(status: int, words: Path) -> str:
+def ended(status: int, otherwise: dict[int, str]) -> str:
+    """What a status says of a mutant: "timeout", "killed", or what ``otherwise`` says of an exit code."""
     if os.WIFSIGNALED(status):
         return "timeout" if os.WTERMSIG(status) == signal.SIGPROF else "killed"
-    code: Any = os.WEXITSTATUS(status)
-    if code == 0:
-        return "survived"
+    return otherwise.get(os.WEXITSTATUS(status), "killed")
+
+
+def verdict(status: int, words: Path) -> str:
+    code: Any = None if os.WIFSIGNALED(status) else os.WEXITSTATUS(status)
     if code == NO_TESTS or code in (3, 4, 70):
         raise RuntimeError(f"the tests did not run (pytest {code}): see {words}")
-    return "killed"
+    return ended(status, {0: "survived"})

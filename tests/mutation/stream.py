@@ -1,11 +1,11 @@
-"""All mutants in one run of the tests: each test is run as it is, and then once more for each mutant that it comes by.
+"""All mutants in one process that has imported, collected and run the tests once.
 
-Imports, collection and what fixtures prepare are paid once for all.  The further runs are processes forked where the
-test has just passed, in which the function that holds the mutant has the mutated code (``probes.swap_of``); what a
-fixture of a wider scope reaches is prepared anew there.  A mutant that falls meets no further test.
+First each test is run as it is, and what it comes by is noted.  Then, for each mutant, a process is forked in which the
+function that holds the mutant has the mutated code (``probes.swap_of``), and in it the tests that come by the mutant
+are run, the quickest and those that killed before first, up to the first that fails.  Fixtures are prepared anew there,
+and what functions of the tree have cached is forgotten.
 
-What is left to a judgement of its own (``judging``): mutants of what runs at import, and those that no test here kills;
-``Stream.reached`` says which tests come by each, and what these cost.
+What is left to a judgement of its own (``judging``): mutants of what runs at import.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -29,40 +28,47 @@ from _pytest.runner import runtestprotocol
 
 from mutation import judging
 from mutation.mutants import Mutant
-from mutation.probes import Probes, Swap, forget_results, swap_of
+from mutation.probes import Probes, forget_results, swap_of
 
-DEAR_S = 2.0
-"""A test of more processor seconds meets mutants later, if these still live."""
 WALL_TIMES = 20.0
 """Seconds by the clock that a run may take, a processor second that it is given."""
 LIVES, FALLS = 0, 1
 """Exit codes of a run."""
-OF_FUNCTION = 2
-"""Parametrisations of a test that a mutant meets here: the others are left over."""
-BUDGET_S = 4.0
-"""Processor seconds of these runs that a mutant may take: a judgement of its own then costs less."""
-LIVED = "lived"
 
 
 @dataclass
 class Stream:
     """``seconds``: what each test takes that passes; ``reached``: number of a mutant -> tests that come by it;
-    ``met``: those at which it lived; ``killed``: number of a mutant -> (verdict, test)."""
+    ``verdicts``: number of a mutant -> (verdict, test at which it fell)."""
 
     seconds: dict[str, float] = field(default_factory=dict)
     reached: dict[int, list[str]] = field(default_factory=dict)
-    met: dict[int, set[str]] = field(default_factory=dict)
-    killed: dict[int, tuple[str, str]] = field(default_factory=dict)
+    verdicts: dict[int, tuple[str, str]] = field(default_factory=dict)
 
     def add(self, line: dict[str, Any]) -> None:
-        test = line["test"]
-        self.seconds[test] = line["seconds"]
+        if "mutant" in line:
+            self.verdicts[line["mutant"]] = line["verdict"], line["test"]
+            return
+        self.seconds[line["test"]] = line["seconds"]
         for number in line["reached"]:
-            self.reached.setdefault(number, []).append(test)
-        for number in line["met"]:
-            self.met.setdefault(number, set()).add(test)
-        for number, verdict in line["killed"]:
-            self.killed[number] = verdict, test
+            self.reached.setdefault(number, []).append(line["test"])
+
+    def kills(self) -> Counter[str]:
+        """How many mutants fell at each test."""
+        return Counter(test for verdict, test in self.verdicts.values() if verdict != "survived")
+
+    def choice(self, number: int, seconds: float) -> dict[str, float]:
+        """Tests that come by a mutant, with what they take, in the order in which it meets them: quick ones and those
+        that killed before; of so many seconds in all, or the first alone."""
+        cost, kills = self.seconds, self.kills()
+        names = sorted(self.reached.get(number, ()), key=lambda name: (cost[name] + 0.02) / (1 + kills[name]))
+        chosen: dict[str, float] = {}
+        spent = 0.0
+        for name in names:
+            spent += cost[name]
+            if spent <= seconds or not chosen:
+                chosen[name] = cost[name]
+        return chosen
 
 
 def load(path: Path) -> Stream:
@@ -74,21 +80,23 @@ def load(path: Path) -> Stream:
 
 
 class _Runner:
-    """The plug-in of pytest that runs tests again for mutants."""
+    """The plug-in of pytest that runs the tests, and then some of them again for each mutant."""
 
-    def __init__(self, tree: Path, mutants: Sequence[tuple[Mutant, str]], probes: Probes, log: Path) -> None:
-        self.tree, self.mutants, self.probes, self.log = tree, mutants, probes, log
+    def __init__(
+        self, tree: Path, mutants: Sequence[tuple[Mutant, str]], probes: Probes, log: Path, seconds: float
+    ) -> None:
+        self.tree, self.mutants, self.probes, self.log, self.budget = tree, mutants, probes, log, seconds
         self.stream = load(log)
-        self.sources = {mutant.path: (tree / mutant.path).read_text() for mutant, _ in mutants}
         self.fixtures: dict[int, set[int]] = {}
         """id of a fixture of a wider scope -> what it comes by."""
         self.collected: dict[str, set[int]] = {}
         """File of tests -> what its import comes by."""
         self.failed: set[str] = set()
-        self.spent: dict[int, float] = {}
-        self.swaps: dict[int, Swap | None] = {}
-        self.functions: Counter[tuple[int, str]] = Counter()
-        self.start = time.monotonic()
+
+    def keep(self, line: dict[str, Any]) -> None:
+        self.stream.add(line)
+        with self.log.open("a", encoding="utf-8") as out:
+            out.write(json.dumps(line) + "\n")
 
     # -- which mutants a test comes by -----------------------------------------------------------------------------
 
@@ -111,21 +119,13 @@ class _Runner:
         finally:
             self.fixtures[id(fixturedef)] = self.probes.reached.turn(before)
 
-    def prepared(self, item: Any) -> tuple[set[int], set[int]]:
-        """What the fixtures of a test come by: those of its file, and those of the whole run."""
-        of_file: set[int] = set()
-        of_run: set[int] = set()
+    def prepared(self, item: Any) -> set[int]:
+        """What the fixtures of wider scopes that a test has come by."""
+        found: set[int] = set()
         for definitions in item._fixtureinfo.name2fixturedefs.values():
             for one in definitions:
-                (of_run if one.scope == "session" else of_file).update(self.fixtures.get(id(one), ()))
-        return of_file, of_run
-
-    # -- the runs --------------------------------------------------------------------------------------------------
-
-    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        items[:] = [item for item in items if item.nodeid not in self.stream.seconds]
-        gc.collect()
-        gc.freeze()
+                found |= self.fixtures.get(id(one), set())
+        return found
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.failed or report.skipped:
@@ -139,88 +139,73 @@ class _Runner:
         result = yield
         seconds = time.process_time() - start
         self.probes.reached.turn(before)
-        line = {"test": item.nodeid, "seconds": seconds, "reached": [], "met": [], "killed": []}
-        if item.nodeid not in self.failed:
-            of_file, of_run = self.prepared(item)
-            imported = self.collected.get(item.nodeid.split("::")[0], set())
-            line["reached"] = sorted(own | of_file | of_run | imported)
-            if seconds <= DEAR_S:
-                for number in sorted(own | of_file):
-                    verdict = self.meet(item, number, seconds, number in of_file)
-                    if verdict == LIVED:
-                        line["met"].append(number)
-                    elif verdict:
-                        line["killed"].append((number, verdict))
-        self.stream.add(line)
-        with self.log.open("a", encoding="utf-8") as out:
-            out.write(json.dumps(line) + "\n")
+        if item.nodeid in self.failed:
+            own = set()
+        else:
+            own |= self.prepared(item) | self.collected.get(item.nodeid.split("::")[0], set())
+        self.keep({"test": item.nodeid, "seconds": seconds, "reached": sorted(own)})
         return result
 
-    def meet(self, item: pytest.Item, number: int, seconds: float, anew: bool) -> str:
-        """How a mutant fares at a test; empty where it is not asked, or can not be put in place."""
-        function = number, item.nodeid.partition("[")[0]
-        if number in self.stream.killed or self.spent.get(number, 0.0) > BUDGET_S:
-            return ""
-        if number not in self.swaps:
-            mutant, text = self.mutants[number]
-            self.swaps[number] = swap_of(self.tree, mutant, text, self.sources[mutant.path])
-        swap = self.swaps[number]
-        if swap is None or self.functions[function] >= OF_FUNCTION:
-            return ""
-        self.functions[function] += 1
-        start = os.times()
-        verdict = self.run(item, swap, seconds, anew)
-        end = os.times()
-        used = end.children_user + end.children_system - start.children_user - start.children_system
-        self.spent[number] = self.spent.get(number, 0.0) + used
-        return verdict
+    # -- the runs --------------------------------------------------------------------------------------------------
 
-    def run(self, item: pytest.Item, swap: Swap, seconds: float, anew: bool) -> str:
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        items = [item for item in session.items if item.nodeid not in self.stream.seconds]
+        for item, following in zip(items, [*items[1:], None], strict=True):
+            session.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
+        gc.collect()
+        gc.freeze()
+        by_name = {item.nodeid: item for item in session.items}
+        for number in range(len(self.mutants)):
+            if number not in self.stream.verdicts:
+                self.judge(number, by_name)
+        return True
+
+    def judge(self, number: int, items: dict[str, pytest.Item]) -> None:
+        """Lets a mutant meet its tests; nothing is kept of one that can not be put in place."""
+        mutant, text = self.mutants[number]
+        chosen = self.stream.choice(number, self.budget)
+        swap = swap_of(self.tree, mutant, text, (self.tree / mutant.path).read_text(encoding="utf-8"))
+        if not chosen or swap is None:
+            return
+        note = self.log.with_suffix(".note")
+        note.write_text("")
         sys.stdout.flush()
-        limit = judging.LIMIT_S + judging.LIMIT_TIMES * seconds
         pid = os.fork()
         if pid == 0:
-            self._child(item, swap, limit, anew)
+            code = FALLS
+            try:
+                os.setsid()
+                resource.setrlimit(resource.RLIMIT_AS, (judging.MEMORY, judging.MEMORY))
+                signal.signal(signal.SIGPROF, signal.SIG_DFL)
+                signal.signal(signal.SIGTERM, signal.SIG_DFL)
+                swap.put_in_place()
+                forget_results(self.tree)
+                code = _run([items[name] for name in chosen], chosen, note)
+            finally:
+                os._exit(code)
+        limit = sum(map(judging.limit, chosen.values()))
         status = judging.wait(pid, WALL_TIMES * limit)
-        if status is None:
-            return "timeout"
-        if os.WIFSIGNALED(status):
-            return "timeout" if os.WTERMSIG(status) == signal.SIGPROF else "killed"
-        return LIVED if os.WEXITSTATUS(status) == LIVES else "killed"
-
-    def _child(self, item: Any, swap: Swap, limit: float, anew: bool) -> None:
-        """Never returns."""
-        code = FALLS
-        try:
-            os.setsid()
-            resource.setrlimit(resource.RLIMIT_AS, (judging.MEMORY, judging.MEMORY))
-            signal.signal(signal.SIGPROF, signal.SIG_DFL)
-            signal.setitimer(signal.ITIMER_PROF, limit)
-            gc.disable()
-            swap.put_in_place()
-            forget_results(self.tree)
-            chain = item.listchain()
-            if anew:
-                kept = [
-                    one for one in chain if not isinstance(one, pytest.Module | pytest.Class | pytest.Item)
-                ]
-                item.session._setupstate.teardown_exact(SimpleNamespace(listchain=lambda: kept))
-            item._initrequest()
-            following = SimpleNamespace(listchain=lambda: chain[:-1])
-            reports = runtestprotocol(item, log=False, nextitem=following)
-            code = FALLS if any(report.failed for report in reports) else LIVES
-        finally:
-            os._exit(code)
+        verdict = "timeout" if status is None else judging.ended(status, {LIVES: "survived"})
+        self.keep(
+            {"mutant": number, "verdict": verdict, "test": "" if verdict == "survived" else note.read_text()}
+        )
 
 
-def order(tree: Path, tests: Sequence[str], packages: Sequence[str]) -> list[str]:
-    """Files of tests, those first that import what is in the packages: what they test is near, and quick."""
-    names = [package.replace("/", ".") for package in packages]
+def _run(items: Sequence[Any], seconds: dict[str, float], note: Path) -> int:
+    """Runs tests up to the first that fails; each has a limit."""
+    for item, following in zip(items, [*items[1:], None], strict=True):
+        note.write_text(item.nodeid)
+        signal.setitimer(signal.ITIMER_PROF, judging.limit(seconds[item.nodeid]))
+        item._initrequest()
+        if any(report.failed for report in runtestprotocol(item, log=False, nextitem=following)):
+            return FALLS
+    return LIVES
 
-    def far(test: str) -> bool:
-        return not any(one.startswith(name) for one in judging.imported(tree / test) for name in names)
 
-    return sorted(tests, key=far)
+def is_near(tree: Path, test: str, packages: Sequence[str]) -> bool:
+    """Whether a file of tests imports what is in the packages."""
+    names = tuple(package.replace("/", ".") for package in packages)
+    return any(one.startswith(names) for one in judging.imported(tree / test))
 
 
 def run(
@@ -228,9 +213,11 @@ def run(
     mutants: Sequence[tuple[Mutant, str]],
     tests: Sequence[str],
     log: Path,
+    seconds: float,
     tier: str,
 ) -> Stream:
-    """Runs files of tests in a process of its own.  A run that was stopped goes on where it was."""
+    """Runs files of tests in a process of its own, and at most so many processor seconds of them for a mutant.  A run
+    that was stopped goes on where it was."""
     pid = os.fork()
     if pid == 0:
         code = 70
@@ -243,14 +230,13 @@ def run(
             probes = Probes(tree, [mutant for mutant, _ in mutants])
             probes.install()
             os.environ["POSTPROC_THREADS"] = "1"  # a fork takes one thread along
-            plugin = _Runner(tree, mutants, probes, log)
+            plugin = _Runner(tree, mutants, probes, log, seconds)
             options = [*judging.OPTIONS, "--hypothesis-profile", judging.PROFILE, "-m", tier]
             code = int(pytest.main([*tests, *options], plugins=[plugin]))
         finally:
             sys.stdout.flush()
             os._exit(code)
     status = judging.wait(pid, None)
-    ended = {0, judging.FAILED} | ({judging.NO_TESTS} if log.exists() else set())  # all had been done before
-    if status is None or os.WIFSIGNALED(status) or os.WEXITSTATUS(status) not in ended:
+    if status is None or os.WIFSIGNALED(status) or os.WEXITSTATUS(status) not in (0, judging.FAILED):
         raise RuntimeError(f"the tests did not run to their end: see {log.with_suffix('.words')}")
     return load(log)
