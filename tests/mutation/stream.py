@@ -20,6 +20,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -150,7 +151,7 @@ class _Runner:
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         items = [item for item in session.items if item.nodeid not in self.stream.seconds]
-        for item, following in zip(items, [*items[1:], None], strict=True):
+        for item, following in zip_longest(items, items[1:]):
             session.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
         gc.collect()
         gc.freeze()
@@ -193,7 +194,7 @@ class _Runner:
 
 def _run(items: Sequence[Any], seconds: dict[str, float], note: Path) -> int:
     """Runs tests up to the first that fails; each has a limit."""
-    for item, following in zip(items, [*items[1:], None], strict=True):
+    for item, following in zip_longest(items, items[1:]):
         note.write_text(item.nodeid)
         signal.setitimer(signal.ITIMER_PROF, judging.limit(seconds[item.nodeid]))
         item._initrequest()
@@ -237,6 +238,9 @@ def run(
             sys.stdout.flush()
             os._exit(code)
     status = judging.wait(pid, None)
-    if status is None or os.WIFSIGNALED(status) or os.WEXITSTATUS(status) not in (0, judging.FAILED):
+    ended = {0, judging.FAILED} | (
+        {judging.NO_TESTS} if load(log).seconds else set()
+    )  # all had been run before
+    if status is None or os.WIFSIGNALED(status) or os.WEXITSTATUS(status) not in ended:
         raise RuntimeError(f"the tests did not run to their end: see {log.with_suffix('.words')}")
     return load(log)
