@@ -178,6 +178,17 @@ def test_a_corner_is_evaluated_before_and_after_its_point(at: float) -> None:
     np.testing.assert_allclose(off, np.linalg.norm(expected, axis=1), rtol=1e-6)
 
 
+def test_an_exact_point_is_no_rounded_corner() -> None:
+    """It has neither reach nor error; the corner after it has both, of the position and of the orientation."""
+    job = square(2e-3)
+    division = subdivide(job, correct(job), FREE)
+    motion = np.flatnonzero(division.original & np.isin(division.source, [1, 2]))
+    found = np.stack(evaluate_corners(RoundedOutput(job, division, motion), motion))
+    assert found.shape == (3, 2)
+    assert (found[:, 0] == 0).all()
+    assert (found[:, 1] > 0).all()
+
+
 def test_what_is_inserted_keeps_the_shortest_length() -> None:
     job = square(2e-3)
     limits = replace(FREE, ramp_end=0.8e-3)
