@@ -268,7 +268,7 @@ def jacobian_of(load, values, state, step=1e-5):
     return found, np.abs(found).max() + np.abs(force_of(load, values, state)[0]).max()
 
 
-@pytest.mark.sample(1)
+@pytest.mark.sample(4)
 @arms
 @pytest.mark.parametrize("name", of_kind(EnergyLoad))
 def test_force_is_the_gradient_of_one_energy(name, arm):

@@ -302,3 +302,6 @@ def test_the_orientation_after_a_run_of_plain_lines_is_that_of_a_last_ptp() -> N
     turned = body(lines + last + rest).toolpath
     np.testing.assert_allclose(known.toolpath.rotation[-1], turned.rotation[-1], atol=1e-12)
     assert len(codes(body("$ORI_TYPE=#CONSTANT\n" + lines + rest))) == 1
+    line = "LIN {X 60,Y 2,Z 3,A 80,B 5,C 6}\n"
+    assert len(codes(body("$ORI_TYPE=#CONSTANT\n" + lines + last + line + rest))) == 1
+    assert codes(body("$ORI_TYPE=#CONSTANT\n" + lines + last + line.replace("A 80", "A 70") + rest)) == []
