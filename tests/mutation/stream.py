@@ -40,13 +40,17 @@ LIVES, FALLS = 0, 1
 @dataclass
 class Stream:
     """``seconds``: what each test takes that passes; ``reached``: number of a mutant -> tests that come by it;
-    ``verdicts``: number of a mutant -> (verdict, test at which it fell)."""
+    ``verdicts``: number of a mutant -> (verdict, test at which it fell); ``ended``: all that can be done here is."""
 
     seconds: dict[str, float] = field(default_factory=dict)
     reached: dict[int, list[str]] = field(default_factory=dict)
     verdicts: dict[int, tuple[str, str]] = field(default_factory=dict)
+    ended: bool = False
 
     def add(self, line: dict[str, Any]) -> None:
+        if "ended" in line:
+            self.ended = True
+            return
         if "mutant" in line:
             self.verdicts[line["mutant"]] = line["verdict"], line["test"]
             return
@@ -159,6 +163,7 @@ class _Runner:
         for number in range(len(self.mutants)):
             if number not in self.stream.verdicts:
                 self.judge(number, by_name)
+        self.keep({"ended": True})
         return True
 
     def judge(self, number: int, items: dict[str, pytest.Item]) -> None:
@@ -219,6 +224,9 @@ def run(
 ) -> Stream:
     """Runs files of tests in a process of its own, and at most so many processor seconds of them for a mutant.  A run
     that was stopped goes on where it was."""
+    seen = load(log)
+    if seen.ended:
+        return seen
     pid = os.fork()
     if pid == 0:
         code = 70
