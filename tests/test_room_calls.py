@@ -10,6 +10,7 @@ CALLED_WITH_FUNCTIONS = {
     "base/geometry.py": "poses that are made when they are asked for",
     "output/atomic_write.py": "contents of files, a part at a time",
     "output/write.py": "what the reading of the output lacks, as for the input",
+    "report/report.py": "the check of the tests that every result is what its schema says",
     "workflows/program.py": "the name of the stage, for the terminal",
 }
 """Files whose functions call functions of higher rooms, which gave them these."""
@@ -17,9 +18,9 @@ CALLED_WITH_FUNCTIONS = {
 
 def test_only_what_was_given_a_function_calls_up(job, monkeypatch):
     monkeypatch.setenv("POSTPROC_THREADS", "1")
-    counted = count_calls([str(job.program), "--force"], ROOMS)
+    counted = count_calls([str(job.program), "--force", "-q"], ROOMS)
     assert job.output.exists()
-    assert {source.split()[0] for source, _ in counted.up} <= set(CALLED_WITH_FUNCTIONS)
+    assert not [pair for pair in counted.up if pair[0].split()[0] not in CALLED_WITH_FUNCTIONS]
     assert counted.up
     assert counted.calls.total() > 10 * counted.up.total()
     assert {room for pair in counted.calls for room in pair} <= set(ROOMS)
