@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.base.arrays import Floats
+from postproc.base.arrays import Floats, Ints
 from postproc.base.units import MM
 from postproc.effects import EFFECTS
 from postproc.learning.causes import Cause, CauseKind, CausePrediction
@@ -37,7 +37,9 @@ _SEEN = 0.3
 @dataclass(frozen=True, eq=False)
 class MissingEffect:
     """``name``; ``causes``: those that it adds; ``model``: with its effect; ``columns`` (K, Q) [m per standard
-    deviation]; ``transfers``: it holds at another place too; ``wide``: with the sides of axes in wide gaps."""
+    deviation]; ``transfers``: it holds at another place too; ``wide``: with the sides of axes in wide gaps; ``unsure``
+    (K,) [m per standard deviation] or nothing: standard deviation of what it does to each point, where it is not known
+    whether it acts there."""
 
     name: str
     causes: tuple[Cause, ...]
@@ -45,24 +47,32 @@ class MissingEffect:
     columns: Floats
     transfers: bool
     wide: bool = False
+    unsure: Floats | None = None
 
     @property
     def family(self) -> str:
         """The effect without its joint."""
         return self.name.split(" ")[0]
 
+    def unsure_at(self, rows: Ints, factor: float) -> Floats | None:
+        """(J,) [m] ``unsure`` of points ``rows`` (J,) at ``factor`` standard deviations."""
+        return None if self.unsure is None else factor * self.unsure[rows]
+
     def widened(self, factor: float) -> MissingEffect:
-        """With ``factor`` times the standard deviations of its causes, and the same columns."""
+        """With ``factor`` times the standard deviations of its causes, as unsure as at that size, and the same
+        columns."""
         wide = tuple(replace(cause, deviation=factor * cause.deviation) for cause in self.causes)
-        return replace(self, causes=wide)
+        return replace(self, causes=wide, unsure=None if self.unsure is None else factor * self.unsure)
 
 
 @dataclass(frozen=True, eq=False)
 class Circumstances:
-    """Of K points: ``corner`` (K,) 0..1, how far the feed turns within the cutter's radius; ``time`` (K,) 0..1, when
-    they were cut."""
+    """Of K points: ``corner`` (K,) 0..1, how far the feed turns within the cutter's radius; ``corner_unsure`` (K,) 0..1,
+    standard deviation of that, as it is not known from where on the force feels a corner; ``time`` (K,) 0..1, when they
+    were cut."""
 
     corner: Floats
+    corner_unsure: Floats
     time: Floats
 
 
@@ -157,7 +167,12 @@ def _of_process(prediction: CausePrediction, x: Floats, around: Circumstances) -
         )  # a force falls where the tool leaves, and never rises
         one = CausePrediction(points, model, (*prediction.causes, cause))
         columns = _own_columns(one, np.append(x, 0.0), 1) * size
-        found.append(MissingEffect(name, (cause,), model, columns, transfers=True))
+        unsure = None
+        if name == "corner_force":
+            full = replace(cause, weight=np.ones(len(weight)))
+            everywhere = CausePrediction(points, model, (*prediction.causes, full))
+            unsure = np.abs(_own_columns(everywhere, np.append(x, 0.0), 1)[:, 0] * size * around.corner_unsure)
+        found.append(MissingEffect(name, (cause,), model, columns, transfers=True, unsure=unsure))
     if np.ptp(around.time) > 0.05:
         drifts = [
             Cause(f"drift {axis}", "effect", CauseKind.SHIFT, DRIFT, "m", weight=points.normal[:, i] * around.time,
