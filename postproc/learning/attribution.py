@@ -68,6 +68,11 @@ class Attribution:
         return self.prediction.causes
 
     @property
+    def effect_names(self) -> frozenset[str]:
+        """Effects that were named, and those of which the part does not tell which."""
+        return frozenset({one.name for one in self.named}.union(self.alternatives))
+
+    @property
     def surface(self) -> SmoothField:
         return self.explained.surface
 

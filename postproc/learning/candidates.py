@@ -171,7 +171,9 @@ def _of_process(prediction: CausePrediction, x: Floats, around: Circumstances) -
         if name == "corner_force":
             full = replace(cause, weight=np.ones(len(weight)))
             everywhere = CausePrediction(points, model, (*prediction.causes, full))
-            unsure = np.abs(_own_columns(everywhere, np.append(x, 0.0), 1)[:, 0] * size * around.corner_unsure)
+            unsure = np.abs(
+                _own_columns(everywhere, np.append(x, 0.0), 1)[:, 0] * size * around.corner_unsure
+            )
         found.append(MissingEffect(name, (cause,), model, columns, transfers=True, unsure=unsure))
     if np.ptp(around.time) > 0.05:
         drifts = [
