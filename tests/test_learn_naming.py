@@ -88,7 +88,7 @@ def test_the_gain_of_an_effect_is_the_ratio_of_two_normal_densities(unsure):
 
 @pytest.mark.parametrize(("sure", "named"), [(True, False), (False, True)])
 def test_points_where_it_is_not_sure_that_an_effect_acts_do_not_speak_against_it(sure, named):
-    """Four points in corners that agree, and four at their edge where nothing shows: outliers, or a force in corners."""
+    """Four points in corners that agree, and four at their edge where nothing shows: a force in corners."""
     from postproc.learning.covariance import Explanation, SmoothField
     from postproc.learning.excluded_points import find_outliers
     from postproc.learning.naming import NAMED, weigh_effects

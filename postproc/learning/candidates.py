@@ -67,9 +67,9 @@ class MissingEffect:
 
 @dataclass(frozen=True, eq=False)
 class Circumstances:
-    """Of K points: ``corner`` (K,) 0..1, how far the feed turns within the cutter's radius; ``corner_unsure`` (K,) 0..1,
-    standard deviation of that, as it is not known from where on the force feels a corner; ``time`` (K,) 0..1, when they
-    were cut."""
+    """Of K points: ``corner`` (K,) 0..1, how far the feed turns within the cutter's radius; ``corner_unsure`` (K,) its
+    standard deviation, as it is not known from where on the force feels a corner; ``time`` (K,) 0..1, when they were
+    cut."""
 
     corner: Floats
     corner_unsure: Floats
