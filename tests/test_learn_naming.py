@@ -22,8 +22,8 @@ def test_a_corner_reaches_as_far_as_the_cutter():
     assert weight == pytest.approx([0, 0, 0.5, 1, 1, 0.5, 0, 0, 1, 0], abs=0.13)
     wide = turns.at(np.zeros(1, int), np.array([0.5]), np.array([0.06]))
     assert wide == pytest.approx([1.0])
-    unsure = turns.unsure_at(np.zeros(10, int), share, np.full(10, 0.008))
-    assert unsure == pytest.approx([0, 0, 0.5, 0, 0, 0.5, 0, 0, 0, 0], abs=0.2)
+    sigma = turns.sigma_at(np.zeros(10, int), share, np.full(10, 0.008))
+    assert sigma == pytest.approx([0, 0, 0.5, 0, 0, 0.5, 0, 0, 0, 0], abs=0.2)
 
 
 def test_a_size_that_cannot_be_negative_gains_nothing_from_it():
@@ -58,8 +58,8 @@ def layout_of(rng, count):
     return Layout(rng.uniform(0, 0.3, (count, 3)), normal, np.full(count, 1e-5), free, np.zeros(count, int))
 
 
-@pytest.mark.parametrize("unsure", [None, 2e-5])
-def test_the_gain_of_an_effect_is_the_ratio_of_two_normal_densities(unsure):
+@pytest.mark.parametrize("sigma", [None, 2e-5])
+def test_the_gain_of_an_effect_is_the_ratio_of_two_normal_densities(sigma):
     """Against scipy's density of the whole covariance, for a shift of either sign, and where it is not sure whether it
     acts on a point."""
     from scipy.stats import multivariate_normal
@@ -75,13 +75,13 @@ def test_the_gain_of_an_effect_is_the_ratio_of_two_normal_densities(unsure):
     bare = Explanation(layout, SmoothField(1e-5, 0.06, 3e-6), rest, causes, 1e-5 * rng.normal(size=count))
     effect = MissingEffect(
         "drift", tuple(Cause(a, "effect", CauseKind.SHIFT, 1.0) for a in "xy"), None, columns, False,
-        unsure=None if unsure is None else unsure * rng.uniform(size=count),
+        column_sigma=None if sigma is None else sigma * rng.uniform(size=count),
     )  # fmt: skip
     covariance = layout.covariance(bare.surface, bare.by_force) + causes @ causes.T
     for factor, gain in zip(FACTORS, gains_with(bare, effect, np.arange(count)), strict=True):
         with_it = covariance + factor**2 * columns @ columns.T
-        if effect.unsure is not None:
-            with_it = with_it + factor**2 * np.diag(effect.unsure**2)
+        if effect.column_sigma is not None:
+            with_it = with_it + factor**2 * np.diag(effect.column_sigma**2)
         likely = [multivariate_normal(cov=1e10 * one).logpdf(1e5 * rest) for one in (with_it, covariance)]
         assert gain == pytest.approx(likely[0] - likely[1], abs=1e-6)
 
@@ -96,8 +96,8 @@ def test_points_where_it_is_not_sure_that_an_effect_acts_do_not_speak_against_it
     rng = np.random.default_rng(11)
     count = 60
     layout = layout_of(rng, count)
-    column, unsure = np.zeros((count, 1)), np.zeros(count)
-    column[:4, 0], column[4:8, 0], unsure[4:8] = 1.5e-4, 0.7e-4, 0.7e-4
+    column, sigma = np.zeros((count, 1)), np.zeros(count)
+    column[:4, 0], column[4:8, 0], sigma[4:8] = 1.5e-4, 0.7e-4, 0.7e-4
     rest = rng.normal(0, 1e-5, count)
     rest[:4] += 3e-4
     whole = Explanation(layout, SmoothField(), rest, np.zeros((count, 0)), np.zeros(count))
@@ -105,7 +105,7 @@ def test_points_where_it_is_not_sure_that_an_effect_acts_do_not_speak_against_it
     kept[find_outliers(whole, 6)] = False
     assert not kept[:4].any()
     cause = Cause("corner_force", "effect", CauseKind.FORCE, 0.3)
-    effect = MissingEffect("corner_force", (cause,), None, column, True, unsure=None if sure else unsure)
+    effect = MissingEffect("corner_force", (cause,), None, column, True, column_sigma=None if sure else sigma)
     best = weigh_effects(whole.part(np.flatnonzero(kept)), whole, [effect], kept)[0]
     assert (best.gain > NAMED) == named
     assert best.kept[:4].all() == named

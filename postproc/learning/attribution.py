@@ -158,6 +158,7 @@ def attribute(
     x, kept = prediction.before[0].copy(), np.ones(len(deviation), bool)
     x, kept = _settle(prediction, deviation, layout, x, kept, outliers=True)
     explained = _explained(prediction, deviation, layout, x, kept)
+    measured = layout
     bare = _Hypothesis(prediction, layout, x, kept, explained)
     named: list[Likelier] = []
     joined: list[MissingEffect] = []
@@ -212,7 +213,7 @@ def attribute(
     return Attribution(
         prediction,
         deviation,
-        layout,
+        measured,
         kept,
         prediction.causes_at(mean),
         root @ covariance @ root.T,
@@ -243,7 +244,7 @@ def _with_effect(
     """The causes with those of an effect beside them; None where they cannot be found, or are as good as null.  A gap
     acts otherwise near its null than at its size: the likelier of two starts counts."""
     trial, found = prediction.with_causes(effect.causes, effect.model, effect.wide), []
-    layout = layout.unsure(effect.unsure)
+    layout = layout.with_noise(effect.column_sigma)
     for start in (0.0, 1.0):
         sizes = [start * cause.deviation for cause in effect.causes]
         try:

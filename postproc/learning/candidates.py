@@ -37,9 +37,9 @@ _SEEN = 0.3
 @dataclass(frozen=True, eq=False)
 class MissingEffect:
     """``name``; ``causes``: those that it adds; ``model``: with its effect; ``columns`` (K, Q) [m per standard
-    deviation]; ``transfers``: it holds at another place too; ``wide``: with the sides of axes in wide gaps; ``unsure``
-    (K,) [m per standard deviation] or nothing: standard deviation of what it does to each point, where it is not known
-    whether it acts there."""
+    deviation]; ``transfers``: it holds at another place too; ``wide``: with the sides of axes in wide gaps;
+    ``column_sigma`` (K,) [m per standard deviation] or nothing: standard deviation of what it does to each point, where
+    it is not known whether it acts there."""
 
     name: str
     causes: tuple[Cause, ...]
@@ -47,32 +47,34 @@ class MissingEffect:
     columns: Floats
     transfers: bool
     wide: bool = False
-    unsure: Floats | None = None
+    column_sigma: Floats | None = None
 
     @property
     def family(self) -> str:
         """The effect without its joint."""
         return self.name.split(" ")[0]
 
-    def unsure_at(self, rows: Ints, factor: float) -> Floats | None:
-        """(J,) [m] ``unsure`` of points ``rows`` (J,) at ``factor`` standard deviations."""
-        return None if self.unsure is None else factor * self.unsure[rows]
+    def column_sigma_at(self, rows: Ints, factor: float) -> Floats | None:
+        """(J,) [m] ``column_sigma`` of points ``rows`` (J,) at ``factor`` standard deviations."""
+        return None if self.column_sigma is None else factor * self.column_sigma[rows]
 
     def widened(self, factor: float) -> MissingEffect:
-        """With ``factor`` times the standard deviations of its causes, as unsure as at that size, and the same
+        """With ``factor`` times the standard deviations of its causes, with ``column_sigma`` of that size, and the same
         columns."""
         wide = tuple(replace(cause, deviation=factor * cause.deviation) for cause in self.causes)
-        return replace(self, causes=wide, unsure=None if self.unsure is None else factor * self.unsure)
+        return replace(
+            self, causes=wide, column_sigma=None if self.column_sigma is None else factor * self.column_sigma
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Circumstances:
-    """Of K points: ``corner`` (K,) 0..1, how far the feed turns within the cutter's radius; ``corner_unsure`` (K,) its
+    """Of K points: ``corner`` (K,) 0..1, how far the feed turns within the cutter's radius; ``corner_sigma`` (K,) its
     standard deviation, as it is not known from where on the force feels a corner; ``time`` (K,) 0..1, when they were
     cut."""
 
     corner: Floats
-    corner_unsure: Floats
+    corner_sigma: Floats
     time: Floats
 
 
@@ -167,14 +169,12 @@ def _of_process(prediction: CausePrediction, x: Floats, around: Circumstances) -
         )  # a force falls where the tool leaves, and never rises
         one = CausePrediction(points, model, (*prediction.causes, cause))
         columns = _own_columns(one, np.append(x, 0.0), 1) * size
-        unsure = None
+        sigma = None
         if name == "corner_force":
             full = replace(cause, weight=np.ones(len(weight)))
             everywhere = CausePrediction(points, model, (*prediction.causes, full))
-            unsure = np.abs(
-                _own_columns(everywhere, np.append(x, 0.0), 1)[:, 0] * size * around.corner_unsure
-            )
-        found.append(MissingEffect(name, (cause,), model, columns, transfers=True, unsure=unsure))
+            sigma = np.abs(_own_columns(everywhere, np.append(x, 0.0), 1)[:, 0] * size * around.corner_sigma)
+        found.append(MissingEffect(name, (cause,), model, columns, transfers=True, column_sigma=sigma))
     if np.ptp(around.time) > 0.05:
         drifts = [
             Cause(f"drift {axis}", "effect", CauseKind.SHIFT, DRIFT, "m", weight=points.normal[:, i] * around.time,

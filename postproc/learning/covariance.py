@@ -67,7 +67,7 @@ class Layout:
             self.place[rows], self.normal[rows], self.sigma[rows], self.free[rows], self.group[rows]
         )
 
-    def unsure(self, more: Floats | None) -> Layout:
+    def with_noise(self, more: Floats | None) -> Layout:
         """With an error of standard deviation ``more`` (K,) [m] beside that of the probe, or the same."""
         return self if more is None else replace(self, sigma=np.hypot(self.sigma, more))
 
@@ -176,9 +176,9 @@ class Explanation:
             self.layout, self.surface, self.rest, np.concatenate([self.columns, more], axis=1), self.by_force
         )
 
-    def unsure(self, more: Floats | None) -> Explanation:
+    def with_noise(self, more: Floats | None) -> Explanation:
         """With an error of standard deviation ``more`` (K,) [m] beside that of the probe, or the same."""
-        return self if more is None else replace(self, layout=self.layout.unsure(more))
+        return self if more is None else replace(self, layout=self.layout.with_noise(more))
 
     def part(self, rows: Ints) -> Explanation:
         """Of some points (J,)."""

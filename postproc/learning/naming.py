@@ -82,7 +82,7 @@ def weigh_effects(
     for i, one in enumerate(found[:REFINED]):
         rows = np.flatnonzero(one.kept)
         own = explained if one.kept is kept else everything.part(rows)
-        with_it = own.unsure(one.effect.unsure_at(rows, one.factor))
+        with_it = own.with_noise(one.effect.column_sigma_at(rows, one.factor))
         full = choose_surface(with_it.with_columns(one.factor * one.effect.columns[rows]), 1)
         again = weighed(one.effect, one.kept, own.with_surface(full.surface))
         found[i] = replace(again, gain=max(one.gain, again.gain))
@@ -109,7 +109,7 @@ def _outside(kept: Bools) -> float:
 def _kept_with(everything: Explanation, effect: MissingEffect, kept: Bools) -> Bools:
     """(K,) those of the points ``kept`` (K,) that the causes and the effect do not contradict."""
     rows = np.flatnonzero(kept)
-    part = everything.part(rows).unsure(effect.unsure_at(rows, max(FACTORS)))
+    part = everything.part(rows).with_noise(effect.column_sigma_at(rows, max(FACTORS)))
     with_it = part.with_columns(max(FACTORS) * effect.columns[rows])
     out = find_outliers(with_it, int(MOST_OUTLIERS * len(kept)) - int((~kept).sum()))
     found = kept.copy()
@@ -124,8 +124,8 @@ def gains_with(explained: Explanation, effect: MissingEffect, rows: Ints) -> lis
     gram = pull = np.zeros(0)
     for factor in FACTORS:
         gain = 0.0
-        if effect.unsure is not None or not gains:
-            own = explained.unsure(effect.unsure_at(rows, factor))
+        if effect.column_sigma is not None or not gains:
+            own = explained.with_noise(effect.column_sigma_at(rows, factor))
             columns, rest = own.whiten(effect.columns[rows]), own.whiten(explained.rest)
             gram, pull = columns.T @ columns, columns.T @ rest
             gain = own.evidence - explained.evidence

@@ -211,7 +211,7 @@ class FeedTurns:
         low, high = (np.interp(place + side * radius, self.station, self.turned) for side in (-1.0, 1.0))
         return np.asarray(np.clip((high - low) / (0.5 * np.pi), 0.0, 1.0))
 
-    def unsure_at(self, rows: Ints, share: Floats, radius: Floats) -> Floats:
+    def sigma_at(self, rows: Ints, share: Floats, radius: Floats) -> Floats:
         """(K,) 0..1 standard deviation of that, as it is not known from where on the force feels a turn."""
         less, more = (self.at(rows, share, reach * radius) for reach in _REACH)
         return 0.5 * (more - less)

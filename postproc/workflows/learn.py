@@ -245,7 +245,7 @@ def _findings(
         help = ""
         if matched.around.corner[number] > 0.0 and "corner_force" not in result.effect_names:
             message += "; it is in a corner, where a larger force would do this too"
-            help = "measure more points in the corners: the part then tells which of the two it is"
+            help = "measure more points in the corners; they show which of the two it is"
         findings.append(
             Finding(
                 "LRN006", message, str(parts[matched.file[number]].file), int(matched.line[number]), help=help
