@@ -120,7 +120,7 @@ def _kept_with(everything: Explanation, effect: MissingEffect, kept: Bools) -> B
 def gains_with(explained: Explanation, effect: MissingEffect, rows: Ints) -> list[float]:
     """ln p(r | size) - ln p(r) for each size of ``FACTORS``; rows (J,): the effect's rows of the explained points."""
     bounded = [i for i, cause in enumerate(effect.causes) if cause.positive]
-    gains = []
+    gains: list[float] = []
     gram = pull = np.zeros(0)
     for factor in FACTORS:
         gain = 0.0
