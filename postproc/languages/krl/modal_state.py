@@ -12,6 +12,7 @@ import numpy as np
 
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
+from postproc.languages.core.motion_sources import ELSEWHERE, START, Source
 from postproc.languages.krl.external_axes import ALL_LOST, UNSTATED, six
 from postproc.languages.krl.spatial import ZERO, Numbers
 from postproc.languages.krl.statement_effects import Effect
@@ -21,11 +22,6 @@ from postproc.toolpath import LOST, ArcFrame, FrameRef, OrientationMode
 NOT_TO_TARGET = (OrientationMode.CONSTANT, OrientationMode.UNKNOWN)
 """Modes in which a path motion may end with another orientation than that of its target."""
 NAN = float("nan")
-Source = int | bytes
-"""A row after which the robot may be here, or the mark of a place where several paths meet."""
-START, ELSEWHERE = -1, -2
-"""Sources that are no rows: the start of the program, and what this file does not contain."""
-
 Record = dict[bytes, bytes]
 """FDAT, LDAT or PDAT: key -> value, upper case."""
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from postproc.base.arrays import Bools, FewRows, Floats, Ints, is_shared
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
+from postproc.languages.core.motion_sources import ELSEWHERE, Meeting
 from postproc.languages.krl.advance_run import stopped_motions
 from postproc.languages.krl.controller_data import with_declared
 from postproc.languages.krl.execution_context import ExecutionContext
-from postproc.languages.krl.modal_state import ELSEWHERE, Source
 from postproc.languages.krl.motion_rows import MotionRows, RowRefusal
 from postproc.languages.krl.motion_table import MotionTable, Spots
 from postproc.languages.krl.predecessors import continuous, expanded, predecessors, single_sources
@@ -395,7 +395,7 @@ def _locked(rows: MotionRows, table: MotionTable, refused: dict[int, Finding]) -
         return pins
     finding = _finder(rows, table)
     every = range(len(rows))
-    seen: set[Source] = set()
+    seen: set[Meeting] = set()
     for row in rows.builds_on:
         if row in refused:
             message = f"the motion in line {table.line[row]} depends on this end point and is not corrected"

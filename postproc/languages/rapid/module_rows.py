@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from postproc.base.arrays import Bools, Floats, Ints, shared, sums
 from postproc.base.document import Document
-from postproc.languages.core.motion_sources import Meeting, Source, distinguished, expanded
+from postproc.languages.core.motion_sources import ELSEWHERE, Meeting, Source, distinguished, expanded
 from postproc.languages.rapid.data_types import ABSENT
 from postproc.languages.rapid.declared_data import walk
 from postproc.languages.rapid.instructions import MOTIONS, OTHER_MOTIONS
 from postproc.languages.rapid.module_frames import ModuleFrames
 from postproc.languages.rapid.motion_facts import MotionFact, Problem, item_of, not_read, reason_of
-from postproc.languages.rapid.program_state import ELSEWHERE, VARYING, ProgramState
+from postproc.languages.rapid.program_state import VARYING, ProgramState
 from postproc.languages.rapid.propagation import OTHER, Propagation
 from postproc.languages.rapid.quaternions import WORST
 from postproc.languages.rapid.syntax_tree import Instruction, PlainMotions, RapidRoutine

@@ -5,15 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from enum import IntEnum
 
-from postproc.languages.core.motion_sources import Meeting, Source, met
+from postproc.languages.core.motion_sources import START, Meeting, Source, met
 from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.syntax_tree import Remark
 from postproc.languages.rapid.values import UnknownData, Value, joined
 from postproc.toolpath import ArcFrame, OrientationMode
-
-START, ELSEWHERE = -1, -2
-"""In the place of a motion: the start of the program; what the program does not contain."""
 
 
 class Varying(IntEnum):

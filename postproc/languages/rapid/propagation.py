@@ -10,7 +10,7 @@ from collections import defaultdict
 from collections.abc import Set
 from dataclasses import replace
 
-from postproc.languages.core.motion_sources import Meeting, Source
+from postproc.languages.core.motion_sources import ELSEWHERE, START, Meeting, Source
 from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.call_effects import CallEffects, ModeChanges, leaving_words, mode_changes
@@ -31,7 +31,7 @@ from postproc.languages.rapid.instructions import (
     is_motion,
 )
 from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read, override_of, waits_at
-from postproc.languages.rapid.program_state import ELSEWHERE, START, VARYING, ProgramState, Varying
+from postproc.languages.rapid.program_state import VARYING, ProgramState, Varying
 from postproc.languages.rapid.routine_entries import program_entries, run_again, run_aside, value_at_start
 from postproc.languages.rapid.routine_names import RoutineNames
 from postproc.languages.rapid.routine_runner import RoutineRunner

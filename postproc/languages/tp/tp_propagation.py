@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import NamedTuple
 
+from postproc.languages.core.motion_sources import ELSEWHERE, START
 from postproc.languages.core.waits import Waits
 from postproc.languages.tp.statement_flow import END, StatementFlow
 from postproc.languages.tp.tp_statements import (
@@ -31,9 +32,6 @@ from postproc.languages.tp.tp_statements import (
     TpStatement,
     WaitStatement,
 )
-
-START, ELSEWHERE = -1, -2
-"""In the place of a motion: the start of the program; what the program does not contain."""
 
 
 class Contradictory(IntEnum):

@@ -6,6 +6,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats
 from postproc.base.document import Document
+from postproc.languages.core.motion_sources import ELSEWHERE, START
 from postproc.languages.core.waits import Waits
 from postproc.languages.tp.position_data import (
     CARTESIAN,
@@ -19,8 +20,6 @@ from postproc.languages.tp.statement_flow import StatementFlow
 from postproc.languages.tp.tp_listing import NumberedStatement, TpListing
 from postproc.languages.tp.tp_propagation import (
     CONTRADICTORY,
-    ELSEWHERE,
-    START,
     TpPropagation,
     TpState,
 )
