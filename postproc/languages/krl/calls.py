@@ -80,7 +80,7 @@ class Calls(BlockFlow):
 
     def _lose_all(self, item: Statement, name: bytes, key: tuple[int, bytes]) -> None:
         """After a label to which jumps lead that are not followed."""
-        run, meeting = self.run, self._meeting(*key)
+        run, meeting = self.run, run.rows.label(*key)
         self.reachable = True
         run.forget(EVERYTHING, f"after the label {shown(name)} in line {item.line}")
         meeting.sources |= run.state.sources
@@ -89,10 +89,6 @@ class Calls(BlockFlow):
         run.add_finding(
             "KRL024", f"the jumps to {shown(name)} are not followed: from here on nothing is known", item
         )
-
-    def _meeting(self, start: int, name: bytes) -> Meeting:
-        """Of a label of the routine that starts with this statement."""
-        return self.run.rows.meetings[b"label %d " % start + name]
 
     def _start_at(self, head: LabelHead) -> None:
         """Goes on after a label with what holds there."""
@@ -119,7 +115,7 @@ class Calls(BlockFlow):
             run.spline = None
             return at
         if key in self.unfollowed.labels:
-            self._meeting(*key).sources |= run.state.sources
+            run.rows.label(*key).sources |= run.state.sources
             self.reachable = False
             return pc + 1
         left = next(

@@ -158,6 +158,10 @@ class MotionRows:
         """Notes that after these a routine of another module moves the robot first."""
         self.calls.append((self.count, sources))
 
+    def label(self, start: int, name: bytes) -> Meeting:
+        """Where the paths to a label of the routine meet that starts with this statement."""
+        return self.meetings[b"label %d " % start + name]
+
     def truncate(self, count: int) -> None:
         """Takes the rows from ``count`` on out again."""
         while self.count > count:
