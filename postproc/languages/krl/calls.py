@@ -80,7 +80,7 @@ class Calls(BlockFlow):
 
     def _lose_all(self, item: Statement, name: bytes, key: tuple[int, bytes]) -> None:
         """After a label to which jumps lead that are not followed."""
-        run, meeting = self.run, run.rows.label(*key)
+        run, meeting = self.run, self.run.rows.label(*key)
         self.reachable = True
         run.forget(EVERYTHING, f"after the label {shown(name)} in line {item.line}")
         meeting.sources |= run.state.sources
