@@ -12,7 +12,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.findings import Finding
-from postproc.toolpath import Toolpath
+from postproc.toolpath import FrameRef, Toolpath
 
 OTHER_PATHS = "several paths of the program lead to it or from the motion before it"
 SHOWN = 20
@@ -35,20 +35,30 @@ def follow_on(joined: Bools, rows: Sequence[int], before: Sequence[tuple[int, ..
 
 def only_used(path: Toolpath) -> Toolpath:
     """Without the frames that no motion has: nobody needs to know their pose."""
-    used = np.unique(np.concatenate([path.base, path.tool]))
-    used = used[used >= 0]
-    new = np.full(len(path.frames) + 1, -1, np.int32)
-    new[used] = np.arange(len(used))
-    return path.with_columns(
-        base=new[path.base], tool=new[path.tool], frames=tuple(path.frames[i] for i in used.tolist())
-    )
+    base, tool, frames = used_frames(path.base, path.tool, path.frames)
+    return path.with_columns(base=base, tool=tool, frames=frames)
 
 
-def grouped(refused: Mapping[int, Finding], lines: Ints) -> list[Finding]:
-    """The refusals of rows, those of one code and cause as one finding; lines (N,): of all rows."""
+def used_frames(
+    base: Ints, tool: Ints, frames: Sequence[FrameRef]
+) -> tuple[Ints, Ints, tuple[FrameRef, ...]]:
+    """Indices (N,) of bases and tools, and the frames, without those that no motion has."""
+    present = np.zeros(len(frames) + 1, np.bool_)
+    present[base] = present[tool] = True  # the last entry is for those that are not known, -1
+    kept = np.flatnonzero(present[:-1]).tolist()
+    renamed = np.full(len(frames) + 1, -1, np.int32)
+    renamed[kept] = np.arange(len(kept))
+    return renamed[base], renamed[tool], tuple(frames[i] for i in kept)
+
+
+def grouped(
+    refused: Mapping[int, Finding], lines: Ints, cause_of: Callable[[int], str] = lambda row: ""
+) -> list[Finding]:
+    """The refusals of rows, those of one code and cause as one finding; lines (N,): of all rows; ``cause_of`` a
+    row: "" where its message says it."""
     groups: dict[tuple[str, str], list[int]] = {}
     for row, finding in refused.items():
-        groups.setdefault((finding.code, finding.message), []).append(row)
+        groups.setdefault((finding.code, cause_of(row) or finding.message), []).append(row)
     found = []
     for chosen in groups.values():
         first = refused[chosen[0]]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from postproc.base.arrays import Bools, FewRows, Floats, Ints, is_shared
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
 from postproc.languages.core.motion_sources import ELSEWHERE, Meeting
+from postproc.languages.core.row_facts import OTHER_PATHS, grouped, used_frames
 from postproc.languages.krl.advance_run import stopped_motions
 from postproc.languages.krl.controller_data import with_declared
 from postproc.languages.krl.execution_context import ExecutionContext
@@ -25,7 +25,6 @@ from postproc.toolpath import (
     Arcs,
     Configuration,
     EditConstraints,
-    FrameRef,
     Kind,
     MotionSequence,
     MotionSpeeds,
@@ -39,7 +38,6 @@ from postproc.toolpath import (
 
 READ_TOO = "other code reads it too"
 SEVERAL = "its line runs several times"
-OTHER_PATHS = "several paths of the program lead to it or from the motion before it"
 
 
 def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourceMap | None, list[Finding]]:
@@ -54,7 +52,7 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
     refused = _refused(rows, table)
     table.base, frames = with_declared(run.declarations.frames, b"BASE", table.base, run.frames.refs())
     table.tool, frames = with_declared(run.declarations.frames, b"TOOL", table.tool, frames)
-    table.base, table.tool, used = _used(table.base, table.tool, frames)
+    table.base, table.tool, used = used_frames(table.base, table.tool, frames)
     table.blend *= MM
     table.inserted *= MM
     n = len(rows)
@@ -107,7 +105,7 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
         toolpath,
         found,
         [
-            *_reported(rows, table, refused),
+            *grouped(refused, table.line, lambda row: rows.reasons[row].cause),
             *_external_axis_findings(rows, table),
             *_stop_findings(rows, table, stopped),
         ],
@@ -155,16 +153,6 @@ def _partial_components(rows: MotionRows, n: int) -> Floats:
         for row, at in rows.anchors.items()
     }
     return _sparse((n, 6), np.nan, known, np.array([MM] * 3 + [DEG] * 3))
-
-
-def _used(base: Ints, tool: Ints, frames: tuple[FrameRef, ...]) -> tuple[Ints, Ints, tuple[FrameRef, ...]]:
-    """The indices and frames without those that no motion has: nobody needs to know their pose."""
-    present = np.zeros(len(frames) + 1, bool)
-    present[base] = present[tool] = True  # the last entry is for those that are not known, -1
-    kept = np.flatnonzero(present[:-1]).tolist()
-    renamed = np.full(len(frames) + 1, -1, dtype=np.int32)
-    renamed[kept] = np.arange(len(kept))
-    return renamed[base], renamed[tool], tuple(frames[i] for i in kept)
 
 
 def _refuse_other_calls(run: ExecutionContext, table: MotionTable) -> None:
@@ -350,24 +338,6 @@ def _refused(rows: MotionRows, table: MotionTable) -> dict[int, Finding]:
         return {}
     finding = _finder(rows, table)
     return {row: finding(row, reason.code, reason.message) for row, reason in sorted(rows.reasons.items())}
-
-
-def _reported(rows: MotionRows, table: MotionTable, refused: dict[int, Finding]) -> list[Finding]:
-    """The refusals, those of one code and cause as one finding."""
-    groups: dict[tuple[str, str], list[int]] = {}
-    for row in refused:
-        reason = rows.reasons[row]
-        groups.setdefault((reason.code, reason.cause or reason.message), []).append(row)
-    findings = []
-    for found in groups.values():
-        first = refused[found[0]]
-        if len(found) == 1:
-            findings.append(first)
-            continue
-        places = table.line[found]
-        message = f"{first.message}; {len(found)} motions, lines {places.min()} to {places.max()}"
-        findings.append(replace(first, message=message))
-    return findings
 
 
 def _external_axis_findings(rows: MotionRows, table: MotionTable) -> list[Finding]:
