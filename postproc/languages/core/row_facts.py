@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -17,8 +16,6 @@ from postproc.toolpath import FrameRef, Toolpath
 OTHER_PATHS = "several paths of the program lead to it or from the motion before it"
 SHOWN = 20
 """Statements that are not understood are reported one by one up to this number."""
-SPEAKS = re.compile(r"(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
-"""What a comment starts with that speaks to this tool."""
 
 
 def follow_on(joined: Bools, rows: Sequence[int], before: Sequence[tuple[int, ...]]) -> Bools:

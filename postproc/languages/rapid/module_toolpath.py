@@ -11,12 +11,12 @@ from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses, arc_through
 from postproc.base.units import DEG, MM
+from postproc.languages.core.comments_in_force import VARYING, Varying
 from postproc.languages.core.motion_sources import Meeting, Source
 from postproc.languages.core.row_facts import OTHER_PATHS, follow_on, grouped, moving_external, only_used
 from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.module_frames import ModuleFrames
 from postproc.languages.rapid.module_rows import ModuleRows, module_rows
-from postproc.languages.rapid.program_state import VARYING, Varying
 from postproc.languages.rapid.propagation import Propagation
 from postproc.languages.rapid.quaternions import rotation_from_quaternion
 from postproc.languages.rapid.remarks import put_remarks

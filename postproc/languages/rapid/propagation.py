@@ -10,6 +10,7 @@ from collections import defaultdict
 from collections.abc import Set
 from dataclasses import replace
 
+from postproc.languages.core.comments_in_force import VARYING, Varying, place_of
 from postproc.languages.core.flow_runner import FlowRunner
 from postproc.languages.core.motion_sources import ELSEWHERE, START, Meeting, Source
 from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
@@ -31,7 +32,7 @@ from postproc.languages.rapid.instructions import (
     is_motion,
 )
 from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read, override_of, waits_at
-from postproc.languages.rapid.program_state import VARYING, ProgramState, Varying
+from postproc.languages.rapid.program_state import ProgramState
 from postproc.languages.rapid.routine_entries import program_entries, run_again, run_aside, value_at_start
 from postproc.languages.rapid.routine_graph import RapidStep, RoutineGraph
 from postproc.languages.rapid.routine_names import RoutineNames
@@ -256,8 +257,7 @@ class Propagation:
     def _remark(self, step: Remark, state: ProgramState) -> None:
         if self._runner.recording:
             self.passed.setdefault(step.start, (step, self.rows))
-        word = step.text.split(" ")[0].split("\t")[0].split(",")[0].upper()
-        if place := {"FORCE": "force", "COMPENSATE": "switch"}.get(word):
+        if place := place_of(step.text):
             if self.preceding.setdefault(step.start, before := getattr(state, place)) != before:
                 self.preceding[step.start] = VARYING
             setattr(state, place, step)

@@ -7,9 +7,10 @@ executions.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from enum import IntEnum
 
+from postproc.languages.core.comments_in_force import VARYING, Varying, place_of
 from postproc.languages.core.flow_runner import FlowRunner
+from postproc.languages.core.joining import FieldJoins, lost
 from postproc.languages.core.motion_sources import ELSEWHERE, START, Meeting
 from postproc.languages.core.waits import Waits
 from postproc.languages.tp.statement_flow import StatementFlow, TpStep
@@ -33,15 +34,7 @@ from postproc.languages.tp.tp_statements import (
     WaitStatement,
 )
 
-
-class Contradictory(IntEnum):
-    """In the place of a comment in force: it differs with the path of the program."""
-
-    CONTRADICTORY = 0
-
-
-CONTRADICTORY = Contradictory.CONTRADICTORY
-Said = TpRemark | Contradictory | None
+Said = TpRemark | Varying | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,17 +53,8 @@ class TpState:
 
     def joined(self, other: TpState) -> TpState:
         """What holds where two paths meet."""
-        if self == other:
-            return self
-        return TpState(
-            self.base if self.base == other.base else None,
-            self.tool if self.tool == other.tool else None,
-            tuple(sorted(set(self.registers) & set(other.registers))),
-            self.displaced | other.displaced,
-            self.override if self.override == other.override else None,
-            self.force if self.force == other.force else CONTRADICTORY,
-            self.switch if self.switch == other.switch else CONTRADICTORY,
-        )
+        changed = _JOINS.changes(self, other)
+        return replace(self, **changed) if changed else self
 
     def value(self, operand: Operand) -> float | None:
         if isinstance(operand, RegisterOperand):
@@ -100,6 +84,19 @@ class TpState:
         if value is not None and abs(value) < 1e9:
             known[number] = value
         return replace(self, registers=tuple(sorted(known.items())))
+
+
+_JOINS = FieldJoins(
+    {
+        "base": lost(None),
+        "tool": lost(None),
+        "registers": lambda one, other: tuple(sorted(set(one) & set(other))),
+        "displaced": frozenset.union,
+        "override": lost(None),
+        "force": lost(VARYING),
+        "switch": lost(VARYING),
+    }
+)
 
 
 @dataclass(slots=True)
@@ -215,7 +212,8 @@ class TpPropagation:
         """What holds after a statement that is no motion."""
         match one:
             case TpRemark():
-                return _remark(one, state)
+                place = place_of(one.text)
+                return replace(state, **{place: one}) if place else state  # type: ignore[arg-type]
             case FrameSelection():
                 value = state.result(one.value)
                 number = int(value) if value is not None and value == int(value) and value >= 0 else None
@@ -239,15 +237,6 @@ class TpPropagation:
                 state = replace(state, override=None, displaced=frozenset(lost))
                 return replace(state, base=None, tool=None, registers=())
         return state
-
-
-def _remark(one: TpRemark, state: TpState) -> TpState:
-    words = one.text.replace("\t", " ").replace(",", " ").split(" ")
-    if words[0].upper() == "FORCE":
-        return replace(state, force=one)
-    if words[0].upper() == "COMPENSATE":
-        return replace(state, switch=one)
-    return state
 
 
 def _decided(one: ConditionalStatement, state: TpState) -> bool | None:

@@ -6,6 +6,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats
 from postproc.base.document import Document
+from postproc.languages.core.comments_in_force import CONTRADICTED, VARYING
 from postproc.languages.core.motion_sources import ELSEWHERE, START
 from postproc.languages.core.waits import Waits
 from postproc.languages.tp.position_data import (
@@ -19,7 +20,6 @@ from postproc.languages.tp.position_data import (
 from postproc.languages.tp.statement_flow import StatementFlow
 from postproc.languages.tp.tp_listing import NumberedStatement, TpListing
 from postproc.languages.tp.tp_propagation import (
-    CONTRADICTORY,
     TpPropagation,
     TpState,
 )
@@ -137,10 +137,8 @@ class RowBuilder:
             rows.refuse(row, "FTP007", "the structure of the program is not understood")
         elif state is None:
             rows.refuse(row, "FTP009", "the flow that the program defines does not reach it")
-        elif CONTRADICTORY in (state.force, state.switch):
-            rows.refuse(
-                row, "FTP006", "the FORCE or COMPENSATE comment in force differs with the path of the program"
-            )
+        elif VARYING in (state.force, state.switch):
+            rows.refuse(row, "FTP006", CONTRADICTED)
         elif state.displaced:
             names = ", ".join(sorted(name.decode("latin-1") for name in state.displaced))
             rows.refuse(row, "FTP008", f"its target may be displaced ({names})")
