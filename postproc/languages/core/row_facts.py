@@ -39,7 +39,7 @@ def only_used(path: Toolpath) -> Toolpath:
 def used_frames(
     base: Ints, tool: Ints, frames: Sequence[FrameRef]
 ) -> tuple[Ints, Ints, tuple[FrameRef, ...]]:
-    """Indices (N,) of bases and tools, and the frames, without those that no motion has."""
+    """``base`` (N,), ``tool`` (N,), indices in ``frames``, and these, without those that no motion has."""
     present = np.zeros(len(frames) + 1, np.bool_)
     present[base] = present[tool] = True  # the last entry is for those that are not known, -1
     kept = np.flatnonzero(present[:-1]).tolist()

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
-from postproc.languages.core.joining import SOMETIMES, FieldJoins, either, is_same, lost
+from postproc.languages.core.field_joins import SOMETIMES, FieldJoins, either, is_same, lost
 from postproc.languages.core.motion_sources import ELSEWHERE, START, Source
 from postproc.languages.krl.external_axes import ALL_LOST, UNSTATED, six
 from postproc.languages.krl.spatial import ZERO, Numbers

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from postproc.languages.core.comments_in_force import CONTRADICTED, VARYING, Varying
-from postproc.languages.core.joining import SOMETIMES, FieldJoins, either, lost
+from postproc.languages.core.field_joins import SOMETIMES, FieldJoins, either, lost
 from postproc.languages.core.motion_sources import Meeting, Source, met
 from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.data_types import STOP_KINDS

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 
 from postproc.languages.core.comments_in_force import VARYING, Varying
-from postproc.languages.core.joining import SOMETIMES, FieldJoins, either, lost
+from postproc.languages.core.field_joins import SOMETIMES, FieldJoins, either, lost
 from postproc.languages.core.motion_sources import START, Meeting, Source, met
 from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.core.waits import Waits

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from postproc.languages.core.comments_in_force import VARYING, Varying, place_of
+from postproc.languages.core.field_joins import FieldJoins, lost
 from postproc.languages.core.flow_runner import FlowRunner
-from postproc.languages.core.joining import FieldJoins, lost
 from postproc.languages.core.motion_sources import ELSEWHERE, START, Meeting
 from postproc.languages.core.waits import Waits
 from postproc.languages.tp.statement_flow import StatementFlow, TpStep
