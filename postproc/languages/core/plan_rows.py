@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints, differs
 from postproc.base.batches import each_block
 from postproc.base.decimals import fixed_one
+from postproc.base.findings import Finding
 from postproc.base.geometry import rotation_from_vector
 from postproc.base.units import MM
 from postproc.languages.dialect import Plan, Program, WritingSettings
@@ -104,6 +106,31 @@ class PlanRows:
         if sweep < limits.smallest or nearest < limits.nearest:
             return f"the corrected arc is too short for {limits.word}"
         return ""
+
+
+Task = TypeVar("Task", bound=PlanRows)
+
+
+class TargetWriter(Generic[Task]):
+    """The rows of a plan that are written, and why some cannot be.  ``code``: of these; ``help``: what to do."""
+
+    code: str
+    help: str
+
+    def __init__(self, task: Task) -> None:
+        self.task = task
+        self.refused: dict[int, Finding] = {}
+
+    @abstractmethod
+    def start(self, row: int) -> int:
+        """The byte at which the motion of a row starts."""
+
+    def refuse(self, row: int, why: str, code: str = "") -> None:
+        """Takes up why a row cannot be written; the first reason counts."""
+        document = self.task.program.documents[0]
+        place = document.place(self.start(row))
+        found = Finding(code or self.code, why, str(document.path), *place, self.help)
+        self.refused.setdefault(row, found)
 
 
 def refuse_moved(rows: Sequence[int]) -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 from postproc.base.document import Document, Edit
 from postproc.base.findings import Finding, Refusal
 from postproc.base.read_files import list_folder
+from postproc.languages.core.dialect_defaults import DialectDefaults
 from postproc.languages.dialect import (
-    MARK,
     PLAIN,
     DialectOption,
     EditedTargets,
@@ -17,7 +17,6 @@ from postproc.languages.dialect import (
     Program,
     ReadingSettings,
     WritingSettings,
-    put_mark,
 )
 from postproc.languages.krl import codes as codes
 
@@ -33,11 +32,12 @@ _CLAIM = re.compile(
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,23}")
 
 
-class KrlDialect:
+class KrlDialect(DialectDefaults):
     """KRL as a ``Dialect``."""
 
     name = "krl"
     family = "KRL"
+    comment = ";"
     letters = b"ABCDEFGHIJKLMNOPQRSTUVWXYZ"  # points have names
     companion_suffixes: tuple[str, ...] = (".dat",)
     suffixes: tuple[str, ...] = (".src", ".sub")
@@ -81,9 +81,6 @@ class KrlDialect:
         from postproc.languages.krl import writer
 
         return writer.edit_targets(program, plan, writing)
-
-    def marked(self, program: Program, text: str) -> Edit:
-        return put_mark(program, f";{MARK}{text}".encode("latin-1", "replace"))
 
     def renamed(self, program: Program, stem: str) -> list[Edit]:
         """Edits that call the program ``stem``.  Raises Refusal (FIL011) where that cannot name a module."""

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.base.arrays import Bools, FewRows, Floats, Ints, is_shared
+from postproc.base.arrays import Bools, Floats, Ints, is_shared
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
 from postproc.languages.core.motion_sources import ELSEWHERE, Meeting
-from postproc.languages.core.row_facts import OTHER_PATHS, grouped, used_frames
+from postproc.languages.core.row_facts import OTHER_PATHS, LockedRows, axis_targets, grouped, used_frames
 from postproc.languages.krl.advance_run import stopped_motions
 from postproc.languages.krl.controller_data import with_declared
 from postproc.languages.krl.execution_context import ExecutionContext
@@ -58,7 +58,6 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
     n = len(rows)
     anchor = _sparse((n,), np.int32(-1), {row: at.row for row, at in rows.anchors.items()})
     given = _partial_components(rows, n)
-    axes = np.array(list(table.axes.values())).reshape(-1, 6) * DEG
     several = _several(table)
     continues = _read_only(continuous(rows, single))
     stopped = _stop(table, stopped_motions(rows, continues))
@@ -67,7 +66,7 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
             kind=_read_only(table.kind),
             position=_read_only(table.position),
             rotation=_read_only(table.rotation),
-            axes=FewRows(np.array(list(table.axes), np.int32), _read_only(axes), n),
+            axes=axis_targets(table.axes, n),
             base=_read_only(table.base),
             tool=_read_only(table.tool),
             frames=used,
@@ -360,23 +359,21 @@ def _external_axis_findings(rows: MotionRows, table: MotionTable) -> list[Findin
 
 def _locked(rows: MotionRows, table: MotionTable, refused: dict[int, Finding]) -> dict[int, Finding]:
     """Rows that a refused motion builds on, or whose reached position the program reads."""
-    pins: dict[int, Finding] = {}
     if not rows.builds_on and not rows.reads:
-        return pins
-    finding = _finder(rows, table)
+        return {}
+    locked = LockedRows(_finder(rows, table), "KRL009", "KRL002")
     every = range(len(rows))
     seen: set[Meeting] = set()
     for row in rows.builds_on:
         if row in refused:
             message = f"the motion in line {table.line[row]} depends on this end point and is not corrected"
-            for pin in _among(every, expanded(rows, rows.builds_on[row], seen)):
-                pins.setdefault(pin, finding(pin, rows.reasons[row].code, message))
+            locked.add(
+                _among(every, expanded(rows, rows.builds_on[row], seen)), rows.reasons[row].code, message
+            )
     seen = set()
     for line, sources in rows.reads:
-        for pin in _among(every, expanded(rows, sources, seen)):
-            message = f"line {line} reads the end position of this motion"
-            pins.setdefault(pin, finding(pin, "KRL002", message))
-    return dict(sorted(pins.items()))
+        locked.are_read(_among(every, expanded(rows, sources, seen)), line)
+    return locked.done()
 
 
 def _among(every: range, rows: set[int]) -> list[int]:

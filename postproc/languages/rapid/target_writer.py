@@ -10,14 +10,12 @@ import numpy as np
 from postproc.base.arrays import Ints
 from postproc.base.decimals import fixed, fixed_one
 from postproc.base.document import Edit, Edits, Span
-from postproc.base.findings import Finding
-from postproc.languages.core.plan_rows import PlannedNumbers, blocks
+from postproc.languages.core.plan_rows import PlannedNumbers, TargetWriter, blocks
 from postproc.languages.dialect import EditedTargets, Plan, Program, WritingSettings
 from postproc.languages.rapid.inserted_lines import insertions
 from postproc.languages.rapid.plan_writer import PlanWriter, aggregate
 from postproc.languages.rapid.target_places import MotionText, PointText
 
-HELP = "Give each motion its own point in numbers."
 _OPERAND = frozenset(b"0123456789 \t.,:+-*/'=#_$[]{}()\\ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz")
 
 
@@ -29,10 +27,12 @@ def edit_targets(program: Program, plan: Plan, writing: WritingSettings) -> Edit
     return _Writer(program, plan, writing).edited()
 
 
-class _Writer:
+class _Writer(TargetWriter[PlanWriter]):
+    code = "RAP015"
+    help = "Give each motion its own point in numbers."
+
     def __init__(self, program: Program, plan: Plan, writing: WritingSettings) -> None:
-        self.task = PlanWriter(program, plan, writing)
-        self.refused: dict[int, Finding] = {}
+        super().__init__(PlanWriter(program, plan, writing))
 
     def edited(self) -> EditedTargets:
         task = self.task
@@ -124,7 +124,5 @@ class _Writer:
             return f"{shown or 'its target'} is shared by several motions"
         return ""
 
-    def refuse(self, row: int, why: str, code: str = "RAP015") -> None:
-        document = self.task.program.documents[0]
-        place = document.place(self.task.text(row).start)
-        self.refused.setdefault(row, Finding(code, why, str(document.path), *place, HELP))
+    def start(self, row: int) -> int:
+        return self.task.text(row).start

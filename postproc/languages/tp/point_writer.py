@@ -11,15 +11,13 @@ import numpy as np
 from postproc.base.arrays import Bools, Ints
 from postproc.base.decimals import fixed, literals, other_literal
 from postproc.base.document import Edit, Edits, Span
-from postproc.base.findings import Finding
-from postproc.languages.core.plan_rows import BLOCK, PlannedNumbers, blocks
+from postproc.languages.core.plan_rows import BLOCK, PlannedNumbers, TargetWriter, blocks
 from postproc.languages.dialect import EditedTargets, Plan, Program, Role, WritingSettings
 from postproc.languages.tp.position_data import TpPosition
 from postproc.languages.tp.tp_plan import NewPoints, TpPlanNumbers, new_literals
 from postproc.languages.tp.tp_statements import TpMove
 from postproc.toolpath import Kind
 
-HELP = "Give each motion its own point."
 FLOWING = b"CNT100"
 """Of inserted points at which the robot does not stop, where the motion itself does."""
 
@@ -32,11 +30,13 @@ def edit_targets(program: Program, plan: Plan, writing: WritingSettings) -> Edit
     return _PointWriter(program, plan, writing).edited()
 
 
-class _PointWriter:
+class _PointWriter(TargetWriter[TpPlanNumbers]):
+    code = "FTP015"
+    help = "Give each motion its own point."
+
     def __init__(self, program: Program, plan: Plan, writing: WritingSettings) -> None:
-        self.task = TpPlanNumbers(program, plan, writing)
+        super().__init__(TpPlanNumbers(program, plan, writing))
         self.points = NewPoints(self.task)
-        self.refused: dict[int, Finding] = {}
 
     def edited(self) -> EditedTargets:
         task = self.task
@@ -240,7 +240,5 @@ class _PointWriter:
         ):
             yield Edit(Span(0, span[0], span[0] + len(b"%d" % listing.count)), b"%d" % count)
 
-    def refuse(self, row: int, why: str, code: str = "FTP015") -> None:
-        document = self.task.program.documents[0]
-        place = document.place(self.task.place(row, self.task.move(row).head).start)
-        self.refused.setdefault(row, Finding(code, why, str(document.path), *place, HELP))
+    def start(self, row: int) -> int:
+        return self.task.place(row, self.task.move(row).head).start
