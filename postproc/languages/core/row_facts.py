@@ -58,8 +58,8 @@ def axis_targets(axes: Mapping[int, Sequence[float]], count: int) -> FewRows:
 
 
 def circles(starts: Floats, vias: Floats, ends: Floats, nearest: float) -> tuple[Floats, Floats, Floats]:
-    """Centres, normals (K, 3) and sweeps (K,) [m, rad] of arcs through points (K, 3) [m]; NaN where these define none
-    that is known, or two of them are ``nearest`` [m] or less apart."""
+    """Centres, normals (K, 3) and sweeps (K,) [m, rad] of the arcs from ``starts`` (K, 3) through ``vias`` (K, 3) to
+    ``ends`` (K, 3) [m]; NaN where these define none that is known, or two of them are ``nearest`` [m] or less apart."""
     centre, normal, sweep = arc_through(starts, vias, ends)
     pairs = ((starts, vias), (vias, ends), (starts, ends))
     near = np.min([np.linalg.norm(one - other, axis=1) for one, other in pairs], axis=0)
@@ -90,7 +90,7 @@ def only_used(path: Toolpath) -> Toolpath:
 def used_frames(
     base: Ints, tool: Ints, frames: Sequence[FrameRef]
 ) -> tuple[Ints, Ints, tuple[FrameRef, ...]]:
-    """``base`` (N,), ``tool`` (N,), indices in ``frames``, and these, without those that no motion has."""
+    """(N,) and (N,): ``base`` (N,) and ``tool`` (N,) as indices in the ``frames`` that motions have; and these frames."""
     present = np.zeros(len(frames) + 1, np.bool_)
     present[base] = present[tool] = True  # the last entry is for those that are not known, -1
     kept = np.flatnonzero(present[:-1]).tolist()

@@ -34,7 +34,7 @@ class LineWords:
     def token(self, place: int) -> int:
         """Reads what starts at ``place``; where it ends."""
 
-    def taken(self, head: re.Match[bytes] | None, place: int, deleted: bool) -> LexedLine:
+    def lexed(self, head: re.Match[bytes] | None, place: int, deleted: bool) -> LexedLine:
         """The line, whose ``head`` is passed, from ``place`` on."""
         text = self.text
         while place < len(text):

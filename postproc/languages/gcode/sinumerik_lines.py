@@ -113,7 +113,7 @@ class _SinumerikLine(LineWords):
         if label is not None:
             self.note("label", label[1].upper())
             place = label.end()
-        return self.taken(head, place, deleted)
+        return self.lexed(head, place, deleted)
 
     def codes(self, at: int, stop: int, name: bytes) -> None:
         for number in self.names[name]:
