@@ -90,7 +90,7 @@ def only_used(path: Toolpath) -> Toolpath:
 def used_frames(
     base: Ints, tool: Ints, frames: Sequence[FrameRef]
 ) -> tuple[Ints, Ints, tuple[FrameRef, ...]]:
-    """(N,) and (N,): ``base`` (N,) and ``tool`` (N,) as indices in the ``frames`` that motions have; and these frames."""
+    """``base`` and ``tool`` (N,), (N,) as indices in those of ``frames`` that motions have, and these."""
     present = np.zeros(len(frames) + 1, np.bool_)
     present[base] = present[tool] = True  # the last entry is for those that are not known, -1
     kept = np.flatnonzero(present[:-1]).tolist()

@@ -42,7 +42,7 @@ class KukaCncLines:
     def __call__(self, text: bytes) -> LexedLine:
         head = _HEAD.match(text)
         place = head.end() if head else 0
-        return _KukaCncLine(text, self._names).taken(
+        return _KukaCncLine(text, self._names).lexed(
             None, place, head is not None and head["slash"] is not None
         )
 
