@@ -7,8 +7,8 @@ from pathlib import Path
 
 from postproc.base.document import Document, Edit
 from postproc.base.findings import Finding, Refusal
-from postproc.base.read_files import list_folder
 from postproc.languages.core.dialect_defaults import DialectDefaults
+from postproc.languages.core.sibling_files import files_in
 from postproc.languages.dialect import (
     PLAIN,
     DialectOption,
@@ -47,11 +47,7 @@ class KrlDialect(DialectDefaults):
 
     def companions(self, path: Path) -> list[Path]:
         wanted = {(path.stem.lower(), suffix) for suffix in self.companion_suffixes}
-        try:
-            beside = list_folder(path.parent)
-        except FileNotFoundError:
-            return []
-        matches = [p for p in beside if (p.stem.lower(), p.suffix.lower()) in wanted and p.is_file()]
+        matches = files_in(path.parent, lambda p: (p.stem.lower(), p.suffix.lower()) in wanted) or []
         # Where several differ by case only, the one spelt as the program is.
         return sorted(matches, key=lambda p: p.stem != path.stem)[:1]
 

@@ -10,6 +10,7 @@ import numpy as np
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
 from postproc.languages.core.field_joins import SOMETIMES, FieldJoins, either, is_same, lost
+from postproc.languages.core.frame_table import FrameTable
 from postproc.languages.core.motion_sources import ELSEWHERE, START, Source
 from postproc.languages.krl.external_axes import ALL_LOST, UNSTATED, six
 from postproc.languages.krl.spatial import ZERO, Numbers
@@ -39,62 +40,58 @@ def _pose(values: Numbers) -> Poses:
     return Poses.from_abc(np.array(values[:3]) * MM, np.array(values[3:]) * DEG)
 
 
-class FrameRegister:
+class FrameRegister(FrameTable):
     """The frames of a program, each once."""
 
     def __init__(self) -> None:
-        self._index: dict[tuple[int | None, Numbers | None, bool], int] = {}
+        super().__init__()
         self._values: list[Numbers | None] = []
         self._within: list[Numbers] = []
-        self._refs: list[FrameRef] = []
 
     def known(self, number: int | None, values: Numbers | None, line: int) -> FrameIndex:
         """The frame of this number and pose (X..C, mm and deg); number 0 is the identity."""
         if number == 0:
             values = ZERO
-        key = (number, values, False)
-        if key not in self._index:
-            pose = None if values is None else _pose(values)
-            self._index[key] = len(self._refs)
-            self._values.append(values)
-            self._within.append(ZERO)
-            self._refs.append(FrameRef(number, pose, line))
-        return FrameIndex(self._index[key], line)
+        found = self.index(
+            (number, values, False), lambda: FrameRef(number, None if values is None else _pose(values), line)
+        )
+        return self._with(found, line, values, ZERO)
 
     def in_entry(self, entry: FrameEntry, line: int) -> FrameIndex:
         """The frame that is, or is stated in, an entry whose pose the program does not state."""
         if entry.within == ZERO:
             return self.known(entry.number, None, line)
-        key = (entry.number, entry.within, True)
-        if key not in self._index:
-            self._index[key] = len(self._refs)
-            self._values.append(None)
-            self._within.append(entry.within)
-            self._refs.append(FrameRef(None, None, line, in_entry=(entry.number, _pose(entry.within))))
-        return FrameIndex(self._index[key], line)
+        found = self.index(
+            (entry.number, entry.within, True),
+            lambda: FrameRef(None, None, line, in_entry=(entry.number, _pose(entry.within))),
+        )
+        return self._with(found, line, None, entry.within)
+
+    def _with(self, index: int, line: int, values: Numbers | None, within: Numbers) -> FrameIndex:
+        if index == len(self._values):
+            self._values.append(values)
+            self._within.append(within)
+        return FrameIndex(index, line)
 
     def values(self, frame: FrameIndex | UnknownValue) -> Numbers | None:
         return self._values[frame.index] if isinstance(frame, FrameIndex) else None
 
     def of_other(self, frame: FrameIndex, other: FrameRegister, line: int) -> FrameIndex:
         """The same frame as one of another register."""
-        entry = other._refs[frame.index].in_entry
+        entry = other.refs[frame.index].in_entry
         if entry is not None:
             return self.in_entry(FrameEntry("", "", b"", entry[0], other._within[frame.index]), line)
-        return self.known(other._refs[frame.index].number, other._values[frame.index], line)
+        return self.known(other.refs[frame.index].number, other._values[frame.index], line)
 
     def copied(self, frame: FrameIndex | UnknownValue, table: bytes) -> KrlTarget | FrameEntry | None:
         """What a variable holds to which a frame of ``table``, BASE or TOOL, is assigned; None where it is unknown."""
         if not isinstance(frame, FrameIndex):
             return None
-        values, entry = self._values[frame.index], self._refs[frame.index].entry
+        values, entry = self._values[frame.index], self.refs[frame.index].entry
         if values is not None or entry is None:
             return known(values or ZERO)
         why = f"its value is {table.decode()}_DATA[{entry}], whose numbers no program states"
         return FrameEntry("KRL002", why, table, entry, self._within[frame.index])
-
-    def refs(self) -> tuple[FrameRef, ...]:
-        return tuple(self._refs)
 
 
 @dataclass(frozen=True, slots=True)

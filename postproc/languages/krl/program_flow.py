@@ -114,7 +114,7 @@ class ProgramFlow(Calls):
         module, routine = others.routines[name]
         register = FrameRegister()
         entry = state_at_entry(state, run.frames, register)
-        key = name, repr((entry, register.refs(), args))
+        key = name, repr((entry, tuple(register.refs), args))
         if key not in others.outcomes:
             others.outcomes[key] = None  # of a call of itself nothing is known
             few = run.depth < MOST_DEPTH and len(others.outcomes) < MOST_OUTCOMES

@@ -50,7 +50,7 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
     _refuse_several_starts(rows, table, single)
     _lock(run)
     refused = _refused(rows, table)
-    table.base, frames = with_declared(run.declarations.frames, b"BASE", table.base, run.frames.refs())
+    table.base, frames = with_declared(run.declarations.frames, b"BASE", table.base, tuple(run.frames.refs))
     table.tool, frames = with_declared(run.declarations.frames, b"TOOL", table.tool, frames)
     table.base, table.tool, used = used_frames(table.base, table.tool, frames)
     table.blend *= MM

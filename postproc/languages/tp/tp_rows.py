@@ -7,6 +7,7 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats
 from postproc.base.document import Document
 from postproc.languages.core.comments_in_force import CONTRADICTED, VARYING
+from postproc.languages.core.frame_table import FrameTable
 from postproc.languages.core.motion_sources import ELSEWHERE, START
 from postproc.languages.core.waits import Waits
 from postproc.languages.tp.position_data import (
@@ -60,7 +61,7 @@ class TpRows:
         self.waits = {int(self.row_of[one]): waits == Waits.YES for one, waits in run.waits.items()}
         self.axes: dict[int, tuple[float, ...]] = {}
         self.problems: dict[int, tuple[str, str]] = {}
-        self.frames: list[FrameRef] = []
+        self.frames = FrameTable()
         self.assumed: dict[int, str] = {}
 
     def _jumps(self, run: TpPropagation) -> dict[int, tuple[int, ...]]:
@@ -120,7 +121,6 @@ class RowBuilder:
         self.flow: StatementFlow = run.flow
         self.rows = _rows(run)
         self.assigned, self.every_point, self.frames_set = assigned_data(self.flow.statements)
-        self._indices: dict[tuple[bool, int], int] = {}
 
     def build(self) -> TpRows:
         for row, at in enumerate(self.rows.at.tolist()):
@@ -249,11 +249,7 @@ class RowBuilder:
             return -1
         if selected is None and row not in rows.problems:
             rows.assumed.setdefault(row, name)
-        key = (is_tool, number)
-        if key not in self._indices:
-            self._indices[key] = len(rows.frames)
-            rows.frames.append(FrameRef(number, None, int(rows.lines[row])))
-        return self._indices[key]
+        return rows.frames.index((is_tool, number), lambda: FrameRef(number, None, int(rows.lines[row])))
 
     def _configuration(self, row: int, group: PositionGroup, kind: int) -> tuple[int, int]:
         """Flags and turns of the configuration as numbers, -1 where they are not known."""

@@ -59,7 +59,7 @@ def toolpath_of(
             axes=axis_targets(rows.axes, n),
             base=rows.base,
             tool=rows.tool,
-            frames=tuple(rows.frames),
+            frames=tuple(rows.frames.refs),
             external=rows.external,
         ),
         line=rows.lines,
