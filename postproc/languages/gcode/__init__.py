@@ -30,11 +30,13 @@ if TYPE_CHECKING:
 class GcodeDialect(DialectDefaults):
     """G-code of one control as a ``Dialect``.
 
-    control: its table, with what a program of these bytes names; made where it is asked for, as tables take their time
-    to build.  semicolon: comments start with one, parentheses are none.
+    recognises: whether a file of this name and content is for it.  control: its table, with what a program of these
+    bytes names; made where it is asked for, as tables take their time to build.  semicolon: comments start with one,
+    parentheses are none.
     """
 
     name: str
+    recognises: Callable[[Path, bytes], bool]
     control: Callable[[bytes], Control]
     semicolon: bool = False
 
@@ -44,7 +46,7 @@ class GcodeDialect(DialectDefaults):
     )
 
     def claims(self, path: Path, raw: bytes) -> bool:
-        return detection.CLAIMS[self.name](path, raw)
+        return self.recognises(path, raw)
 
     def siblings(
         self, program: Program, settings: ReadingSettings, beside: Path | None = None
@@ -96,9 +98,9 @@ def _linuxcnc(raw: bytes) -> Control:
 
 
 DIALECTS = (
-    GcodeDialect("kuka_cnc", _kuka_cnc, semicolon=True),
-    GcodeDialect("sinumerik", _sinumerik, semicolon=True),
-    GcodeDialect("fanuc", _fanuc),
-    GcodeDialect("linuxcnc", _linuxcnc),
+    GcodeDialect("kuka_cnc", detection.is_kuka_cnc, _kuka_cnc, semicolon=True),
+    GcodeDialect("sinumerik", detection.is_sinumerik, _sinumerik, semicolon=True),
+    GcodeDialect("fanuc", detection.is_fanuc, _fanuc),
+    GcodeDialect("linuxcnc", detection.is_gcode, _linuxcnc),
 )
 """In the order in which they are asked whether a file is theirs."""
