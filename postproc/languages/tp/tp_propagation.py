@@ -12,6 +12,7 @@ from postproc.languages.core.comments_in_force import VARYING, Varying, place_of
 from postproc.languages.core.field_joins import FieldJoins, lost
 from postproc.languages.core.flow_runner import FlowRunner
 from postproc.languages.core.motion_sources import ELSEWHERE, START, Meeting
+from postproc.languages.core.rounded_numbers import are_comparable
 from postproc.languages.core.waits import Waits
 from postproc.languages.tp.statement_flow import StatementFlow, TpStep
 from postproc.languages.tp.tp_statements import (
@@ -245,6 +246,6 @@ def _decided(one: ConditionalStatement, state: TpState) -> bool | None:
         return None
     left, sign, right = one.condition
     a, b = state.value(left), state.value(right)
-    if a is None or b is None:
+    if a is None or b is None or not are_comparable(a, b):
         return None
     return {b"=": a == b, b"<>": a != b, b"<": a < b, b">": a > b, b"<=": a <= b, b">=": a >= b}[sign]
