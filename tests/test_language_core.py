@@ -137,6 +137,19 @@ def test_jumps_lead_to_their_labels_and_may_also_go_on() -> None:
     assert "nor this" not in ran.steps
 
 
+def test_a_label_to_which_only_a_possible_jump_leads_is_run() -> None:
+    graph: FlowGraph[str, tuple[bool | None], str] = FlowGraph()
+    graph.may_jump(["out"])
+    graph.leave(END)
+    graph.label("out")
+    graph.step("zzz")
+    ran = Ran()
+    end = ran.over(graph)
+    assert ran.steps == ["zzz"]
+    assert end is not None
+    assert (end.seen, end.at) == ({"zzz"}, None), "the other path comes here too"
+
+
 def test_labels_that_are_missing_or_there_twice_are_named() -> None:
     graph: FlowGraph[str, tuple[bool | None], str] = FlowGraph()
     graph.label("one")
@@ -172,6 +185,12 @@ def test_a_join_keeps_what_both_have_and_no_more(one: tuple, other: tuple) -> No
     assert joined.waits == (a.waits if a.waits == b.waits else Waits.MAYBE)
     assert FIELDS.changes(joined, b) == {}, "the same path adds nothing a second time"
     assert FIELDS.changes(a, a) == {}
+
+
+def test_equal_values_stay_whatever_the_join_does_with_others() -> None:
+    one, other = (Fields(float("2.5"), frozenset([1]), Waits.YES) for _ in range(2))
+    assert one.number is not other.number
+    assert FIELDS.changes(one, other) == {}
 
 
 def test_either_keeps_the_first_that_there_is() -> None:
