@@ -270,6 +270,9 @@ class ProgramFlow(Calls):
             run.state.external = by_themselves(run.state.external, item.code)
         elif item.word == b"TIME_BLOCK" and run.spline is not None:
             run.state.feed = NAN  # the block takes a time
+            for frame in self.stack:
+                if frame.opened is not None:
+                    frame.opened.feed = NAN
         elif kind == StatementKind.OTHER and run.structure.has_routine and HIDDEN.search(item.code):
             motions.unknown_motion(run, item)
         elif item.word in EVENTS:
