@@ -181,11 +181,14 @@ class RoutineRunner:
         """As ``_region``, of blocks that go back in any way: each with what holds on all paths that lead to it."""
         before, self.recording = self.recording, False
         starts, pending, waiting = {first: state.copy()}, [first], {first}
+        outside: dict[int, Led] = {}
         while pending:
             at = heappop(pending)
             waiting.remove(at)
+            outside[at] = []
             for there, after in self._after(graph, at, starts[at].copy()):
                 if not first <= there < stop:
+                    outside[at].append((there, after))
                     continue
                 if there not in starts:
                     starts[there] = after.copy()
@@ -197,7 +200,8 @@ class RoutineRunner:
         self.recording = before
         leaving: list[ProgramState] = []
         for at in sorted(starts):
-            for there, after in self._after(graph, at, starts[at].copy()):
+            led = self._after(graph, at, starts[at].copy()) if before else outside[at]
+            for there, after in led:
                 if there == -1:
                     ends.append(after.copy())
                 elif there >= 0 and not first <= there < stop:
