@@ -6,10 +6,14 @@ executions.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
+from heapq import heappop, heappush
 from typing import NamedTuple
 
+from postproc.languages.core.motion_sources import Meeting, Source, met
+from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.core.waits import Waits
 from postproc.languages.tp.statement_flow import END, StatementFlow
 from postproc.languages.tp.tp_statements import (
@@ -46,15 +50,18 @@ CONTRADICTORY = Contradictory.CONTRADICTORY
 Said = TpRemark | Contradictory | None
 
 
+NO_REGISTERS = PersistentMap(KeyNumbers())
+
+
 @dataclass(frozen=True, slots=True)
 class TpState:
     """``base``, ``tool``: the selected numbers, None where they are not known; ``registers``: number -> value of those
-    that are known; ``displaced``: what displaces targets; ``override``: factor of speeds, None where it is not
-    known."""
+    that are known, the same object where another path adds nothing; ``displaced``: what displaces targets;
+    ``override``: factor of speeds, None where it is not known."""
 
     base: int | None = None
     tool: int | None = None
-    registers: tuple[tuple[int, float], ...] = ()
+    registers: PersistentMap = NO_REGISTERS
     displaced: frozenset[bytes] = frozenset()
     override: float | None = 1.0
     force: Said = None
@@ -67,7 +74,7 @@ class TpState:
         return TpState(
             self.base if self.base == other.base else None,
             self.tool if self.tool == other.tool else None,
-            tuple(sorted(set(self.registers) & set(other.registers))),
+            self.registers.common(other.registers),
             self.displaced | other.displaced,
             self.override if self.override == other.override else None,
             self.force if self.force == other.force else CONTRADICTORY,
@@ -76,7 +83,8 @@ class TpState:
 
     def value(self, operand: Operand) -> float | None:
         if isinstance(operand, RegisterOperand):
-            return dict(self.registers).get(operand.number)
+            value: float | None = self.registers.get(operand.number)
+            return value
         return operand
 
     def result(self, expression: RegisterExpression) -> float | None:
@@ -98,10 +106,13 @@ class TpState:
 
     def with_register(self, number: int, value: float | None) -> TpState:
         """Another value of a register, None where it is not known; number -1: any of them may have another one."""
-        known = {} if number < 0 else {key: old for key, old in self.registers if key != number}
-        if value is not None and abs(value) < 1e9:
-            known[number] = value
-        return replace(self, registers=tuple(sorted(known.items())))
+        if number < 0:
+            return self.without_registers()
+        kept = value if value is not None and abs(value) < 1e9 else None
+        return replace(self, registers=self.registers.set(number, kept))
+
+    def without_registers(self) -> TpState:
+        return replace(self, registers=PersistentMap(self.registers.numbers))
 
 
 class Reached(NamedTuple):
@@ -109,13 +120,13 @@ class Reached(NamedTuple):
     ``waits``: whether the program waited since."""
 
     state: TpState
-    last: frozenset[int] = frozenset([START])
+    last: frozenset[Source] = frozenset([START])
     waits: Waits = Waits.NO
 
-    def joined(self, other: Reached) -> Reached:
-        """What holds where two paths meet."""
+    def joined(self, other: Reached, meeting: Meeting) -> Reached:
+        """What holds where two paths meet, at the place of ``meeting``."""
         waits = self.waits if self.waits == other.waits else Waits.MAYBE
-        return Reached(self.state.joined(other.state), self.last | other.last, waits)
+        return Reached(self.state.joined(other.state), met(self.last, other.last, meeting), waits)
 
 
 NOWHERE = frozenset([ELSEWHERE])
@@ -130,12 +141,13 @@ class TpPropagation:
 
     flow: StatementFlow
     before: list[TpState | None] = field(init=False)
-    jumps: dict[int, frozenset[int]] = field(default_factory=dict)
+    jumps: dict[int, frozenset[Source]] = field(default_factory=dict)
     calls: dict[int, str] = field(default_factory=dict)
-    reads: dict[int, frozenset[int]] = field(default_factory=dict)
+    reads: dict[int, frozenset[Source]] = field(default_factory=dict)
     unread: set[int] = field(default_factory=set)
     waits: dict[int, Waits] = field(default_factory=dict)
     _alters: bool = field(init=False)
+    _meetings: defaultdict[int, Meeting] = field(default_factory=lambda: defaultdict(Meeting))
 
     def __post_init__(self) -> None:
         self.before = [None] * len(self.flow.statements)
@@ -145,17 +157,24 @@ class TpPropagation:
         """Follows the program from its first statement."""
         if self.flow.problem is not None or not self.flow.blocks:
             return
-        starts = {0: Reached(state)}
-        pending = {0}
+        starts = {0: Reached(replace(state, registers=PersistentMap(KeyNumbers())))}
+        pending, waiting = [0], {0}
         while pending:
-            block = min(pending)
-            pending.remove(block)
+            block = heappop(pending)
+            waiting.remove(block)
             for there, after in self._through(block, starts[block], False):
                 known = starts.get(there)
-                new = after if known is None else known.joined(after)
-                if new != known:
-                    starts[there] = new
-                    pending.add(there)
+                new = (
+                    after
+                    if known is None
+                    else known.joined(after, self._meetings[self.flow.blocks[there][0]])
+                )
+                if new == known:
+                    continue
+                starts[there] = new
+                if there not in waiting:
+                    waiting.add(there)
+                    heappush(pending, there)
         for block in sorted(starts):
             self._through(block, starts[block], True)
 
@@ -190,7 +209,13 @@ class TpPropagation:
             elif END in after and len(after) == 2:
                 states = {there: state for there in after if holds is None or (there == END) == holds}
             else:
-                states = {after[0]: done if holds else state if holds is False else state.joined(done)}
+                states = {
+                    after[0]: done
+                    if holds
+                    else state
+                    if holds is False
+                    else state.joined(done, self._meetings[-1 - at])
+                }
         else:
             done = self._step(at, one, state, recording)
             states = dict.fromkeys(after, done)
@@ -200,7 +225,7 @@ class TpPropagation:
         state, last, waits = reached
         if isinstance(one, TpMove):
             # where a displaced or interrupted motion ends is not in the text
-            state = replace(state, base=None, tool=None, registers=()) if one.alters else state
+            state = _nothing_set(state) if one.alters else state
             ends = {ELSEWHERE} if one.problem is not None else {at, ELSEWHERE} if state.displaced else {at}
             return Reached(state, frozenset(ends))
         if isinstance(one, StatementNotRead) and one.moves:
@@ -240,14 +265,19 @@ class TpPropagation:
             case ProgramCall():
                 if recording:
                     self.calls.setdefault(at, one.name)
-                return replace(state, base=None, tool=None, registers=())
+                return _nothing_set(state)
             case StatementNotRead():
                 if recording:
                     self.unread.add(at)
                 lost = state.displaced | ({b"a statement that is not understood"} if one.displaces else set())
                 state = replace(state, override=None, displaced=frozenset(lost))
-                return replace(state, base=None, tool=None, registers=())
+                return _nothing_set(state)
         return state
+
+
+def _nothing_set(state: TpState) -> TpState:
+    """The same where base, tool and registers may be any."""
+    return replace(state.without_registers(), base=None, tool=None)
 
 
 def _remark(one: TpRemark, state: TpState) -> TpState:

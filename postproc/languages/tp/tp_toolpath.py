@@ -11,6 +11,7 @@ from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.base.geometry import rotation_from_abc
 from postproc.base.units import DEG, MM
+from postproc.languages.core.motion_sources import Meeting
 from postproc.languages.core.row_facts import OTHER_PATHS, grouped, moving_external, only_used
 from postproc.languages.tp.tp_arcs import arcs_of
 from postproc.languages.tp.tp_listing import TpListing
@@ -132,27 +133,27 @@ def _locked(
         if row not in rows.problems:
             locked.setdefault(row, row_finding(document, rows, row, code, message))
 
+    visited: set[Meeting] = set()
+    done: set[int] = set()  # first rows of runs
     for row in rows.problems:
         move = rows.moves[row]
         if move is None or move.form not in (b"C", b"A"):
             continue
-        others = [one for one in runs.get(row, ()) if one not in rows.problems]
-        for one in (*rows.before(row), *others):
-            if one >= 0:
-                lock(
-                    one,
-                    "FTP012",
-                    f"the arc in line {rows.lines[row]} starts at this end point and is not corrected",
-                )
+        run_of = runs.get(row, ())
+        others = () if not run_of or run_of[0] in done else run_of
+        done.update(others[:1])
+        for one in (*rows.starts_of(row, visited), *others):
+            message = f"the arc in line {rows.lines[row]} starts at this end point and is not corrected"
+            lock(one, "FTP012", message)
+    visited = set()
     for row, move in enumerate(rows.moves):
         if move is None or not move.relative:
             continue
-        for one in rows.before(row):
-            if one >= 0:
-                lock(one, "FTP008", f"the motion in line {rows.lines[row]} counts from its end (INC)")
+        for one in rows.starts_of(row, visited):
+            lock(one, "FTP008", f"the motion in line {rows.lines[row]} counts from its end (INC)")
+    visited = set()
     for at, places in sorted(run.reads.items()):
-        for place in sorted(places):
-            if place >= 0:
-                message = f"line {listing.statements[at].line} reads the end position of this motion"
-                lock(int(rows.row_of[place]), "FTP002", message)
+        for one in rows.rows_of(places, visited):
+            message = f"line {listing.statements[at].line} reads the end position of this motion"
+            lock(one, "FTP002", message)
     return dict(sorted(locked.items()))
