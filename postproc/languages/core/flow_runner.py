@@ -190,11 +190,14 @@ class FlowRunner(Generic[Graph, State]):
         """As ``_region``, of blocks that go back in any way: each with what holds on all paths that lead to it."""
         before, self.recording = self.recording, False
         starts, pending, waiting = {first: state.copy()}, [first], {first}
+        outside: dict[int, list[tuple[int, State]]] = {}
         while pending:
             at = heappop(pending)
             waiting.remove(at)
+            outside[at] = []
             for there, after in self._after(graph, at, starts[at].copy()):
                 if not first <= there < stop:
+                    outside[at].append((there, after))
                     continue
                 if there not in starts:
                     starts[there] = after.copy()
@@ -206,7 +209,8 @@ class FlowRunner(Generic[Graph, State]):
         self.recording = before
         leaving: list[State] = []
         for at in sorted(starts):
-            for there, after in self._after(graph, at, starts[at].copy()):
+            led = self._after(graph, at, starts[at].copy()) if before else outside[at]
+            for there, after in led:
                 if there == -1:
                     ends.append(after.copy())
                 elif there >= 0 and not first <= there < stop:

@@ -8,6 +8,7 @@ from postproc.languages.core.motion_sources import Meeting
 from postproc.languages.core.persistent_map import PersistentMap
 from postproc.languages.krl.execution_context import Flow, SplineBlock
 from postproc.languages.krl.lexing import LOOPS
+from postproc.languages.krl.modal_state import ModalState
 from postproc.languages.krl.program_blocks import Block, Routine
 
 
@@ -38,7 +39,7 @@ class BlockFrame:
     none of them may run.  Of loops that are not followed: head: what holds before each pass; meeting: of these.
     counter: of a FOR that is followed: name, value, last value, step.  Of a call: back: where it goes on; returned:
     which parameter comes back into which variable (name, path); lost: variables of which one changes a part; saved:
-    what the caller's variables hold.
+    what the caller's variables hold.  Of a spline: opened: what its WITH sets.
     """
 
     block: Block
@@ -55,6 +56,7 @@ class BlockFrame:
     returned: tuple[tuple[bytes, bytes, bytes], ...] = ()
     lost: frozenset[bytes] = frozenset()
     saved: tuple[tuple[bytes, PersistentMap | None], ...] = ()
+    opened: ModalState | None = None
 
     @property
     def repeats(self) -> bool:

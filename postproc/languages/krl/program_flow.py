@@ -227,15 +227,16 @@ class ProgramFlow(Calls):
             return pc + 1
         if kind != StatementKind.MOTION:
             self._advance_run(pc, item)
-        if not item.code.isascii() and kind != StatementKind.MOTION and has_foreign_letters(item.code):
+        code, structure = item.code, run.structure
+        if not code.isascii() and kind != StatementKind.MOTION and has_foreign_letters(code):
             self._report_letters(item)
         run.variables.line = item.line
-        if item.code in run.structure.ill_formed:
+        if structure.ill_formed and code in structure.ill_formed:
             why = f"after line {item.line}, which is not understood"
-            run.forget(effects_of_unknown(item.code), why)
-        if b"(" in item.code:
+            run.forget(effects_of_unknown(code), why)
+        if b"(" in code:
             self._call_functions(item)
-        if pc in run.structure.events:
+        if pc in structure.events:
             there = self._block_event(pc, item)
             if there is not None or not self.reachable:
                 return pc + 1 if there is None else there
@@ -269,6 +270,9 @@ class ProgramFlow(Calls):
             run.state.external = by_themselves(run.state.external, item.code)
         elif item.word == b"TIME_BLOCK" and run.spline is not None:
             run.state.feed = NAN  # the block takes a time
+            for frame in self.stack:
+                if frame.opened is not None:
+                    frame.opened.feed = NAN
         elif kind == StatementKind.OTHER and run.structure.has_routine and HIDDEN.search(item.code):
             motions.unknown_motion(run, item)
         elif item.word in EVENTS:

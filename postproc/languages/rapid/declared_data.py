@@ -26,6 +26,7 @@ from postproc.languages.rapid.syntax_tree import (
     DataDeclaration,
     For,
     FunctionCall,
+    If,
     Index,
     Instruction,
     Label,
@@ -36,6 +37,8 @@ from postproc.languages.rapid.syntax_tree import (
     RapidRoutine,
     Statement,
     StringLiteral,
+    Test,
+    While,
 )
 from postproc.languages.rapid.values import FALSE, TRUE, GroupValue, Leaf, UnknownData, Value, number_of
 
@@ -319,10 +322,15 @@ def _conditions(statement: Any) -> Iterator[Any]:
         yield values
 
 
+_WITH_BLOCKS = (If, While, For, Test)
+
+
 def walk(body: tuple[Any, ...]) -> Iterator[Any]:
     """All statements of a body, with those of its blocks."""
     for statement in body:
         yield statement
+        if not isinstance(statement, _WITH_BLOCKS):
+            continue
         for _, inner in getattr(statement, "branches", ()):
             yield from walk(inner)
         for _, inner in getattr(statement, "cases", ()):

@@ -233,11 +233,16 @@ def _no_insert_before(
         for row in range(start, stop) if why or wordless else [start]:
             no_insert_before[row] = why or wordless
         if not why and fact.checked is not False:
-            for row in (start + np.flatnonzero(~same[start:stop])).tolist():
-                no_insert_before[row] = OTHER_QUADRANTS
-        for row in (start + np.flatnonzero(~continues[start:stop])).tolist():
-            no_insert_before[row] = OTHER_PATHS
+            no_insert_before.update(dict.fromkeys(_without(same, start, stop), OTHER_QUADRANTS))
+        no_insert_before.update(dict.fromkeys(_without(continues, start, stop), OTHER_PATHS))
     return {row: why for row, why in no_insert_before.items() if why and row not in refused}
+
+
+def _without(mask: Bools, start: int, stop: int) -> list[int]:
+    """The rows from ``start`` to before ``stop`` for which ``mask`` does not hold; most often it is one."""
+    if stop == start + 1:
+        return [] if mask[start] else [start]
+    return [start + row for row in np.flatnonzero(~mask[start:stop]).tolist()]
 
 
 def _locked(

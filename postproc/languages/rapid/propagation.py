@@ -226,7 +226,7 @@ class Propagation:
             case AssignmentStatement():
                 self._functions(step.target, state)
                 self._functions(step.value, state)
-                self._assign(step.target, self._evaluator(state).value(step.value), state)
+                self._assign(step.target, step.value, state)
             case DataDeclaration():
                 if step.value is not None:
                     self._functions(step.value, state)
@@ -427,8 +427,9 @@ class Propagation:
             if one.name in READERS:
                 self._note_reading(one.start, state)
 
-    def _assign(self, target: Expression, value: Value, state: ProgramState) -> None:
+    def _assign(self, target: Expression, given: Expression, state: ProgramState) -> None:
         evaluator = self._evaluator(state)
+        value = evaluator.value(given)
         variable, place = evaluator.assigned_place(target)
         if variable is None:
             return

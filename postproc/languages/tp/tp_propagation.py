@@ -11,7 +11,8 @@ from dataclasses import dataclass, field, replace
 from postproc.languages.core.comments_in_force import VARYING, Varying, place_of
 from postproc.languages.core.field_joins import FieldJoins, lost
 from postproc.languages.core.flow_runner import FlowRunner
-from postproc.languages.core.motion_sources import ELSEWHERE, START, Meeting
+from postproc.languages.core.motion_sources import ELSEWHERE, START, Meeting, Source, met
+from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.core.rounded_numbers import are_comparable
 from postproc.languages.core.waits import Waits
 from postproc.languages.tp.statement_flow import StatementFlow, TpStep
@@ -38,15 +39,18 @@ from postproc.languages.tp.tp_statements import (
 Said = TpRemark | Varying | None
 
 
+NO_REGISTERS = PersistentMap(KeyNumbers())
+
+
 @dataclass(frozen=True, slots=True)
 class TpState:
     """``base``, ``tool``: the selected numbers, None where they are not known; ``registers``: number -> value of those
-    that are known; ``displaced``: what displaces targets; ``override``: factor of speeds, None where it is not
-    known."""
+    that are known, the same object where another path adds nothing; ``displaced``: what displaces targets;
+    ``override``: factor of speeds, None where it is not known."""
 
     base: int | None = None
     tool: int | None = None
-    registers: tuple[tuple[int, float], ...] = ()
+    registers: PersistentMap = NO_REGISTERS
     displaced: frozenset[bytes] = frozenset()
     override: float | None = 1.0
     force: Said = None
@@ -59,7 +63,8 @@ class TpState:
 
     def value(self, operand: Operand) -> float | None:
         if isinstance(operand, RegisterOperand):
-            return dict(self.registers).get(operand.number)
+            value: float | None = self.registers.get(operand.number)
+            return value
         return operand
 
     def result(self, expression: RegisterExpression) -> float | None:
@@ -81,17 +86,20 @@ class TpState:
 
     def with_register(self, number: int, value: float | None) -> TpState:
         """Another value of a register, None where it is not known; number -1: any of them may have another one."""
-        known = {} if number < 0 else {key: old for key, old in self.registers if key != number}
-        if value is not None and abs(value) < 1e9:
-            known[number] = value
-        return replace(self, registers=tuple(sorted(known.items())))
+        if number < 0:
+            return self.without_registers()
+        kept = value if value is not None and abs(value) < 1e9 else None
+        return replace(self, registers=self.registers.set(number, kept))
+
+    def without_registers(self) -> TpState:
+        return replace(self, registers=PersistentMap(self.registers.numbers))
 
 
 _JOINS = FieldJoins(
     {
         "base": lost(None),
         "tool": lost(None),
-        "registers": lambda one, other: tuple(sorted(set(one) & set(other))),
+        "registers": PersistentMap.common,
         "displaced": frozenset.union,
         "override": lost(None),
         "force": lost(VARYING),
@@ -106,19 +114,20 @@ class Reached:
     ``waits``: whether the program waited since."""
 
     state: TpState
-    last: frozenset[int] = frozenset([START])
+    last: frozenset[Source] = frozenset([START])
     waits: Waits = Waits.NO
 
     def copy(self) -> Reached:
         return Reached(self.state, self.last, self.waits)
 
-    def join(self, other: Reached, _: Meeting) -> bool:
-        """Takes in what holds where another path meets this one; whether anything changed."""
+    def join(self, other: Reached, meeting: Meeting) -> bool:
+        """Takes in what holds where another path meets this one, at the place of ``meeting``; whether anything
+        changed."""
         before = self.copy()
         self.state = self.state.joined(other.state)
-        self.last |= other.last
+        self.last = met(self.last, other.last, meeting)
         self.waits = self.waits if self.waits == other.waits else Waits.MAYBE
-        return self != before
+        return self.state is not before.state or (self.last, self.waits) != (before.last, before.waits)
 
     def is_same(self, other: Reached) -> bool:
         return self == other
@@ -136,9 +145,9 @@ class TpPropagation:
 
     flow: StatementFlow
     before: list[TpState | None] = field(init=False)
-    jumps: dict[int, frozenset[int]] = field(default_factory=dict)
+    jumps: dict[int, frozenset[Source]] = field(default_factory=dict)
     calls: dict[int, str] = field(default_factory=dict)
-    reads: dict[int, frozenset[int]] = field(default_factory=dict)
+    reads: dict[int, frozenset[Source]] = field(default_factory=dict)
     unread: set[int] = field(default_factory=set)
     waits: dict[int, Waits] = field(default_factory=dict)
     _alters: bool = field(init=False)
@@ -152,7 +161,8 @@ class TpPropagation:
     def run(self, state: TpState) -> None:
         """Follows the program from its first statement."""
         if self.flow.problem is None:
-            self._runner.run(self.flow, Reached(state), True)
+            registers = PersistentMap(KeyNumbers())
+            self._runner.run(self.flow, Reached(replace(state, registers=registers)), True)
 
     def _after(self, flow: StatementFlow, at: int, reached: Reached) -> list[tuple[int, Reached]]:
         """Where a block leads, and what holds there."""
@@ -196,7 +206,7 @@ class TpPropagation:
             ends = {ELSEWHERE} if one.problem is not None else {at, ELSEWHERE} if state.displaced else {at}
             reached.last, reached.waits = frozenset(ends), Waits.NO
             if one.alters:
-                reached.state = replace(state, base=None, tool=None, registers=())
+                reached.state = _nothing_set(state)
             return
         if isinstance(one, StatementNotRead) and one.moves:
             reached.last, reached.waits = frozenset([at]), Waits.NO
@@ -232,12 +242,17 @@ class TpPropagation:
                 changed = state.displaced | {one.name} if one.starts else state.displaced - {one.name}
                 return replace(state, displaced=frozenset(changed))
             case ProgramCall():
-                return replace(state, base=None, tool=None, registers=())
+                return _nothing_set(state)
             case StatementNotRead():
                 lost = state.displaced | ({b"a statement that is not understood"} if one.displaces else set())
                 state = replace(state, override=None, displaced=frozenset(lost))
-                return replace(state, base=None, tool=None, registers=())
+                return _nothing_set(state)
         return state
+
+
+def _nothing_set(state: TpState) -> TpState:
+    """The same where base, tool and registers may be any."""
+    return replace(state.without_registers(), base=None, tool=None)
 
 
 def _decided(one: ConditionalStatement, state: TpState) -> bool | None:

@@ -12,6 +12,7 @@ from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.base.geometry import rotation_from_abc
 from postproc.base.units import DEG, MM
+from postproc.languages.core.motion_sources import Meeting
 from postproc.languages.core.row_facts import (
     OTHER_PATHS,
     LockedRows,
@@ -135,15 +136,21 @@ def _locked(
     def free(places: Iterable[int]) -> list[int]:
         return [row for row in places if row >= 0 and row not in rows.problems]
 
+    visited: set[Meeting] = set()
+    done: set[int] = set()  # first rows of runs
     for row in rows.problems:
         move = rows.moves[row]
         if move is not None and move.form in (b"C", b"A"):
-            locked.start_arc(free((*rows.before(row), *runs.get(row, ()))), int(rows.lines[row]))
+            run_of = runs.get(row, ())
+            others = () if not run_of or run_of[0] in done else run_of
+            done.update(others[:1])
+            locked.start_arc(free((*rows.starts_of(row, visited), *others)), int(rows.lines[row]))
+    visited = set()
     for row, move in enumerate(rows.moves):
         if move is not None and move.relative:
             message = f"the motion in line {rows.lines[row]} counts from its end (INC)"
-            locked.add(free(rows.before(row)), "FTP008", message)
+            locked.add(free(rows.starts_of(row, visited)), "FTP008", message)
+    visited = set()
     for at, places in sorted(run.reads.items()):
-        ends = [int(rows.row_of[place]) for place in sorted(places) if place >= 0]
-        locked.are_read(free(ends), listing.statements[at].line)
+        locked.are_read(free(rows.rows_of(places, visited)), listing.statements[at].line)
     return locked.done()
