@@ -48,4 +48,7 @@ def without_garbage_collection() -> Iterator[None]:
         yield
     finally:
         if running:
+            if not gc.get_freeze_count():  # as if they had been looked at: all of them are still needed
+                gc.freeze()
+                gc.unfreeze()
             gc.enable()

@@ -12,6 +12,7 @@ from postproc.base.decimals import fixed
 from postproc.base.document import Edits
 from postproc.base.findings import Finding
 from postproc.base.geometry import lengths
+from postproc.languages.core.plan_rows import refuse_divided, refuse_moved
 from postproc.languages.dialect import EditedTargets, Plan, Program, Role, WritingSettings
 from postproc.languages.gcode.control import Move
 from postproc.languages.gcode.source_map import SourceMapPart
@@ -116,13 +117,9 @@ class _Forbidden:
         path = motions.path
         shifted = differs(motions.plan.position[own], path.position[rows]).any(axis=1)
         shifted |= differs(motions.plan.rotation[own], path.rotation[rows]).any(axis=(1, 2))
-        kept = np.flatnonzero(shifted & self.still[rows + motions.first]) + start
-        if len(kept):
-            raise ValueError(f"motions that cannot be corrected are moved: rows {kept[:5].tolist()}")
+        refuse_moved((np.flatnonzero(shifted & self.still[rows + motions.first]) + start).tolist())
         rows = motions.row[~own] + motions.first
-        divided = np.unique(rows[self.whole[rows]])
-        if len(divided):
-            raise ValueError(f"motions that cannot be divided are divided: rows {divided[:5].tolist()}")
+        refuse_divided(np.unique(rows[self.whole[rows]]).tolist())
 
 
 @dataclass(frozen=True, eq=False)
