@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 
 from postproc.base.document import Document
+from postproc.base.geometry import rotation_from_abc
+from postproc.base.units import DEG
 from postproc.languages.krl import lines_alike as alike
 from postproc.languages.krl import scan as scanning
+from postproc.languages.krl.interpreter import read
 from postproc.languages.krl.vectorised import VectorisedLines
 
 COLUMNS = ("is_line", "values", "start", "stop", "motion", "approximation", "status", "turn")
@@ -92,3 +95,13 @@ def test_pieces_are_whole_lines(monkeypatch):
     assert len(spans) > 10
     assert (spans[0][0], spans[-1][1]) == (5, len(text))
     assert all(a[1] == b[0] and text[a[1] - 1] == 10 for a, b in pairwise(spans))
+
+
+@pytest.mark.parametrize("angles", [["0.000"], ["0.000", "-0.000"], ["12.500"], ["12.500", "12.501"]])
+def test_equal_angles_turn_as_each_alone_does(angles):
+    lines = [f"LIN {{X {k},Y 2,Z 3,A {angles[k % len(angles)]},B -0.0,C 180}}\n" for k in range(40)]
+    document = Document(Path("a.src"), ("DEF a()\n" + "".join(lines) + "END\n").encode())
+    quick, alone = (read((document,), fast=fast).toolpath.rotation for fast in (True, False))
+    stated = [[float(angles[k % len(angles)]) + 0.0, 0.0, 180.0] for k in range(40)]  # zero has no minus
+    each = rotation_from_abc(np.array(stated) * DEG)
+    assert quick.tobytes() == alone.tobytes() == np.ascontiguousarray(each).tobytes()
