@@ -98,7 +98,7 @@ def large_arrays_in_files(*programs: Path) -> Iterator[None]:
         return
     # from LARGE on always, and not from the largest block on that was ever given back
     _libc.mallopt(_MMAP_THRESHOLD, LARGE)
-    _libc.mallopt(_TRIM_THRESHOLD, 8 * LARGE)
+    _libc.mallopt(_TRIM_THRESHOLD, 2 * LARGE)
     storage = PagedStorage(folder)
     token, before = current_storage.set(storage), set_handler(handler_for(storage, _usable))
     try:
