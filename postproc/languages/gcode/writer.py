@@ -51,12 +51,12 @@ def edit_targets(program: Program, plan: Plan, writing: WritingSettings) -> Edit
     edits: list[Edits] = []
     ends = Ends(np.full(3, np.nan), np.full(3, np.nan))
 
-    def taken(rows: slice) -> WrittenMotions:
+    def gathered(rows: slice) -> WrittenMotions:
         motions = WrittenMotions.of(program, plan, writing, rows.start, rows.stop, forbidden.rows)
         forbidden.check(motions, rows.start)
         return motions
 
-    for motions in in_blocks(taken, len(path), ROWS):  # only what is written depends on what is before
+    for motions in in_blocks(gathered, len(path), ROWS):  # only what is written depends on what is before
         written, bad, ends = _written(style, motions, ends)
         held |= {row + motions.first: code for row, code in bad.items()}
         edits.append(written)
