@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints, differs
+from postproc.base.batches import in_blocks
 from postproc.base.decimals import fixed
 from postproc.base.document import Edits
 from postproc.base.findings import Finding
@@ -50,11 +51,13 @@ def edit_targets(program: Program, plan: Plan, writing: WritingSettings) -> Edit
     held: dict[int, str] = {}
     edits: list[Edits] = []
     ends = Ends(np.full(3, np.nan), np.full(3, np.nan))
-    for start in range(0, len(path), ROWS):
-        motions = WrittenMotions.of(
-            program, plan, writing, start, min(start + ROWS, len(path)), forbidden.rows
-        )
-        forbidden.check(motions, start)
+
+    def gathered(rows: slice) -> WrittenMotions:
+        motions = WrittenMotions.of(program, plan, writing, rows.start, rows.stop, forbidden.rows)
+        forbidden.check(motions, rows.start)
+        return motions
+
+    for motions in in_blocks(gathered, len(path), ROWS):  # only what is written depends on what is before
         written, bad, ends = _written(style, motions, ends)
         held |= {row + motions.first: code for row, code in bad.items()}
         edits.append(written)
