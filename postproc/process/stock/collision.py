@@ -6,7 +6,8 @@ import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 from postproc.base.units import MM
-from postproc.process.stock.cells import Stock
+from postproc.process.stock.borrowed import borrowed
+from postproc.process.stock.cells import Stock, lent_stock
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.contact import (
     BOUND,
@@ -14,6 +15,7 @@ from postproc.process.stock.contact import (
     SweepCutters,
     find_arcs,
     height_range,
+    lent_cutters,
     set_pose,
 )
 from postproc.process.stock.distance import CUTTER, REMOVES
@@ -81,6 +83,8 @@ def collisions(
 
     sweep (K,) and the share (K,) of it.
     """
+    stock, cutters = lent_stock(stock), lent_cutters(cutters)
+    sweep, share, part, found = borrowed(sweep), borrowed(share), borrowed(part), borrowed(found)
     pose = np.zeros((6, 3))
     for k in range(len(sweep)):
         j = sweep[k]

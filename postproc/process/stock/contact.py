@@ -23,7 +23,8 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
-from postproc.process.stock.cells import Stock, stock_distance
+from postproc.process.stock.borrowed import borrowed
+from postproc.process.stock.cells import Stock, lent_stock, stock_distance
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.distance import (
     ANGLE,
@@ -404,8 +405,18 @@ def find_contact(stock: Stock, cutter: SweepCutter, pose: Floats, contact: Float
 
 
 @compiled
+def lent_cutters(cutters: SweepCutters) -> SweepCutters:
+    """The same, for compiled code that does not count references to it."""
+    return SweepCutters(
+        borrowed(cutters.profiles), borrowed(cutters.laws), borrowed(cutters.live), borrowed(cutters.headings)
+    )
+
+
+@compiled
 def contacts(stock: Stock, cutters: SweepCutters, sweep: Ints, share: Floats, found: Floats) -> None:
     """``found`` (K, COLUMNS) of K poses: sweep (K,) and the share (K,) of it."""
+    stock, cutters = lent_stock(stock), lent_cutters(cutters)
+    sweep, share, found = borrowed(sweep), borrowed(share), borrowed(found)
     pose = np.zeros((6, 3))
     for k in range(len(sweep)):
         j = sweep[k]

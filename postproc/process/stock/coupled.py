@@ -20,7 +20,9 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
-from postproc.process.stock.cells import Stock
+from postproc.process.stock.borrowed import borrowed
+from postproc.process.stock.bounds import set_bound
+from postproc.process.stock.cells import Stock, lent_stock
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.contact import (
     COLUMNS,
@@ -110,11 +112,38 @@ class ToolAtNode(NamedTuple):
 
 
 @compiled
+def _lent_pieces(pieces: Pieces) -> Pieces:
+    return Pieces(
+        borrowed(pieces.rows),
+        borrowed(pieces.laws),
+        borrowed(pieces.live),
+        borrowed(pieces.heading),
+        borrowed(pieces.start),
+        borrowed(pieces.end),
+        borrowed(pieces.fresh),
+        pieces.earlier,
+        pieces.known,
+    )
+
+
+@compiled
+def _lent_nodes(nodes: Nodes) -> Nodes:
+    return Nodes(
+        borrowed(nodes.base),
+        borrowed(nodes.slope),
+        borrowed(nodes.wrench),
+        borrowed(nodes.residual),
+        borrowed(nodes.area),
+    )
+
+
+@compiled
 def solve_pieces(stock: Stock, profiles: Floats, pieces: Pieces, nodes: Nodes, lever: float) -> None:
     """Solve the nodes of all pieces in their order, and put the displaced pieces into the sweeps of ``stock``.
 
     profiles (T, E, 8): as of ``contacts``; lever [m]: how far from the tip a turn of the tool counts.
     """
+    stock, profiles, pieces, nodes = lent_stock(stock), borrowed(profiles), _lent_pieces(pieces), _lent_nodes(nodes)
     pose, came = np.zeros((6, 3)), np.zeros(4)
     moved, contact = np.zeros((6, 3)), np.zeros(COLUMNS)
     first, last, whole = np.zeros(6), np.zeros(6), np.array([0.0, 1.0])
@@ -140,6 +169,7 @@ def solve_pieces(stock: Stock, profiles: Floats, pieces: Pieces, nodes: Nodes, l
             _solve_as_programmed(tool, nodes, a, b, lever)
         _displacement(nodes, b, nodes.wrench[b], last)
         displace_row(pieces.rows, p, whole, first, last, lever, AS_STRAIGHT, stock.sweeps[time])
+        set_bound(stock.sweeps, stock.cutters, time, stock.bounds[time])
 
 
 @compiled
