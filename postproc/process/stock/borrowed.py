@@ -3,7 +3,7 @@
 Numba counts the references to an array at every call of a function that is given it, by an instruction that locks the
 memory; in functions of some dozen operations that is most of the time, and threads wait for each other.  A view that
 belongs to nobody is not counted.  Whoever calls the compiled code holds the arrays meanwhile, and no view outlives the
-call.
+call; an array that a function makes itself it has to ``hold``.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from postproc.base.arrays import Floats, Ints
+from postproc.base.arrays import Floats
+from postproc.process.stock.compiled import compiled
 
 _extending: Any = importlib.import_module("numba.extending")
 _cgutils: Any = importlib.import_module("numba.core.cgutils")
@@ -27,6 +28,12 @@ def _typed(context: Any, array: Any) -> tuple[Any, Any]:
         return view._getvalue()
 
     return array(array), build
+
+
+@compiled
+def hold(array: Floats) -> int:
+    """Called after the last use of what is ``borrowed`` from an array of the same function: until here it exists."""
+    return len(array)
 
 
 borrowed: Any = _extending.intrinsic(_typed)

@@ -6,7 +6,7 @@ import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 from postproc.base.units import MM
-from postproc.process.stock.borrowed import borrowed
+from postproc.process.stock.borrowed import borrowed, hold
 from postproc.process.stock.cells import Stock, lent_stock
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.contact import (
@@ -85,10 +85,12 @@ def collisions(
     """
     stock, cutters = lent_stock(stock), lent_cutters(cutters)
     sweep, share, part, found = borrowed(sweep), borrowed(share), borrowed(part), borrowed(found)
-    pose = np.zeros((6, 3))
+    own = np.zeros((6, 3))
+    pose = borrowed(own)
     for k in range(len(sweep)):
         j = sweep[k]
         set_pose(stock.sweeps, j, share[k], cutters.headings[j], pose)
         time = j + 1 if stock.sweeps[j, REMOVES] > 0.0 else j
         profile = cutters.profiles[int(stock.sweeps[j, CUTTER])]
         found[k] = 1 if collides(stock, profile, part[k], pose, time) else 0
+    hold(own)

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
-from postproc.process.stock.borrowed import borrowed
+from postproc.process.stock.borrowed import borrowed, hold
 from postproc.process.stock.bounds import set_bound
 from postproc.process.stock.cells import Stock, lent_stock
 from postproc.process.stock.compiled import compiled
@@ -144,9 +144,10 @@ def solve_pieces(stock: Stock, profiles: Floats, pieces: Pieces, nodes: Nodes, l
     profiles (T, E, 8): as of ``contacts``; lever [m]: how far from the tip a turn of the tool counts.
     """
     stock, profiles, pieces, nodes = lent_stock(stock), borrowed(profiles), _lent_pieces(pieces), _lent_nodes(nodes)
-    pose, came = np.zeros((6, 3)), np.zeros(4)
-    moved, contact = np.zeros((6, 3)), np.zeros(COLUMNS)
-    first, last, whole = np.zeros(6), np.zeros(6), np.array([0.0, 1.0])
+    own, numbers, whole = np.zeros((12, 3)), np.zeros((4, max(COLUMNS, 6))), np.array([0.0, 1.0])
+    poses, rows = borrowed(own), borrowed(numbers)
+    pose, moved = poses[:6], poses[6:]
+    came, contact, first, last = rows[0, :4], rows[1, :COLUMNS], rows[2, :6], rows[3, :6]
     for p in range(len(pieces.rows)):
         profile = profiles[int(pieces.rows[p, CUTTER])]
         time = pieces.earlier + p
@@ -170,6 +171,8 @@ def solve_pieces(stock: Stock, profiles: Floats, pieces: Pieces, nodes: Nodes, l
         _displacement(nodes, b, nodes.wrench[b], last)
         displace_row(pieces.rows, p, whole, first, last, lever, AS_STRAIGHT, stock.sweeps[time])
         set_bound(stock.sweeps, stock.cutters, time, stock.bounds[time])
+    hold(own)
+    hold(numbers)
 
 
 @compiled
