@@ -40,13 +40,19 @@ _BULGE = 0.126  # of R theta^2: an arc above its chord, 1/8 and what follows up 
 _LARGEST_TURN = 0.5
 
 
+def may_be_bounded(sweeps: Floats) -> bool:
+    """Whether any of sweeps (M, 22) has a bound: those straight across the spindle have a cheap distance, and arcs have
+    none."""
+    return bool(np.any((sweeps[:, MODE] != ACROSS) & (sweeps[:, MODE] != ROUND)))
+
+
 @compiled
 def set_bound(sweeps: Floats, cutters: Floats, j: int, bound: Floats) -> None:
     """``bound`` (BOUND_COLUMNS,) of sweep ``j``; sweeps (M, 22), cutters (T, 6)."""
     bound[:] = 0.0
     turn = turn_of(sweeps, j)
     mode = sweeps[j, MODE]
-    if mode == ACROSS or mode == ROUND or sweeps[j, ANGLE] != 0.0 or turn > _LARGEST_TURN:
+    if mode == ACROSS or sweeps[j, ANGLE] != 0.0 or turn > _LARGEST_TURN:
         return
     c = int(sweeps[j, CUTTER])
     radius, corner = cutters[c, RADIUS], cutters[c, CORNER]
@@ -82,6 +88,8 @@ def set_bound(sweeps: Floats, cutters: Floats, j: int, bound: Floats) -> None:
 def is_far(bounds: Floats, cutters: Floats, j: int, x: float, y: float, z: float, enough: float) -> bool:
     """Whether the bound alone says that the point [m] is farther than ``enough`` [m], which is not negative, from sweep
     ``j``.  bounds (M, BOUND_COLUMNS), cutters (T, 6)."""
+    if len(bounds) == 0:
+        return False
     kind = bounds[j, _KIND]
     if kind == 0.0:
         return False

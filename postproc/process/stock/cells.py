@@ -13,7 +13,7 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.process.stock.blank import Blank, blank_distance, corners_of, lent_blank
 from postproc.process.stock.borrowed import borrowed
-from postproc.process.stock.bounds import BOUND_COLUMNS, is_far, set_bound
+from postproc.process.stock.bounds import BOUND_COLUMNS, is_far, may_be_bounded, set_bound
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.distance import (
     ACROSS,
@@ -48,8 +48,8 @@ class Stock(NamedTuple):
     blank: see ``Blank``; sweeps (M, ROW), cutters (T, 6): see ``distance``; grid (5,): size [m] of the cells, how far
     distances are known [m], and the numbers of cells from the blank's lowest corner; first (C + 1,) and near
     (E,): the sweeps that come that near to each cell, ascending; stop (E,): the last of the sweeps from that of
-    ``near`` on that go on in one line and are near.  bounds (M, BOUND_COLUMNS): of the sweeps, see ``bounds``; whoever
-    changes a sweep sets its bound again.
+    ``near`` on that go on in one line and are near.  bounds (M, BOUND_COLUMNS): of the sweeps, see ``bounds``, or of
+    none (0, BOUND_COLUMNS); whoever changes a sweep sets its bound again.
     """
 
     blank: Blank
@@ -82,7 +82,7 @@ def build_stock(
     cells = int(np.prod(shape))
     none = np.zeros(1, np.int32)
     grid = np.array([size, max(0.5 * size, reach), *shape], float)
-    bounds = np.zeros((len(sweeps), BOUND_COLUMNS))
+    bounds = np.zeros((len(sweeps) if may_be_bounded(sweeps) else 0, BOUND_COLUMNS))
     _set_bounds(sweeps, cutters, bounds)
     stock = Stock(blank, sweeps, bounds, cutters, grid, np.zeros(1, np.int64), none, none)
     count, covered = np.zeros(cells, np.int64), np.full(cells, np.iinfo(np.int32).max, np.int32)
@@ -131,7 +131,7 @@ def lent_stock(stock: Stock) -> Stock:
 @compiled
 def _set_bounds(sweeps: Floats, cutters: Floats, bounds: Floats) -> None:
     sweeps, cutters, bounds = borrowed(sweeps), borrowed(cutters), borrowed(bounds)
-    for j in range(len(sweeps)):
+    for j in range(len(bounds)):
         set_bound(sweeps, cutters, j, bounds[j])
 
 

@@ -243,7 +243,14 @@ def _set_node(
 
 @compiled
 def _set_node_by(
-    stock: Stock, cutter: SweepCutter, e: int, s: float, pose: Floats, contact: Floats, node: Floats, arc: Floats
+    stock: Stock,
+    cutter: SweepCutter,
+    e: int,
+    s: float,
+    pose: Floats,
+    contact: Floats,
+    node: Floats,
+    arc: Floats,
 ) -> None:
     """``_set_node``; arc (12,): of ``find_arcs``."""
     element, law = cutter.profile[e], cutter.law
