@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from postproc.base.arrays import Floats, Ints
+from postproc.base.arrays import Floats
 from postproc.process.stock.borrowed import borrowed, hold
 from postproc.process.stock.bounds import set_bound
 from postproc.process.stock.cells import Stock, lent_stock
@@ -33,8 +33,8 @@ from postproc.process.stock.contact import (
     find_contact,
     set_pose,
 )
-from postproc.process.stock.displaced import displace_row
 from postproc.process.stock.coupled_pieces import Nodes, Pieces, lent_nodes, lent_pieces
+from postproc.process.stock.displaced import displace_row
 from postproc.process.stock.distance import CUTTER, rotated, speed_bound
 
 SETTLED, OF_DISPLACEMENT = 0.1e-6, 1e-3

@@ -125,7 +125,8 @@ def _sizes(
     wide = 2 * cutter.radius
     name = f"tool {cutter.number}"
     if of_cell is not None and abs(wide - of_cell) > SAME_DIAMETER * of_cell:
-        message = f"{name} has the diameter {wide / MM:.6g} mm here, which is used, and {of_cell / MM:.6g} mm in the cell"
+        own, other = wide / MM, of_cell / MM
+        message = f"{name} has the diameter {own:.6g} mm here, which is used, and {other:.6g} mm in the cell"
         yield message, _reason(max(wide / of_cell, of_cell / wide))
     if wide < THINNEST:
         inches = wide * 25.4
@@ -140,8 +141,8 @@ def _sizes(
         ):
             if depth > most * wide:
                 message = (
-                    f"{name} with the diameter {wide / MM:.6g} mm cuts {depth / MM:.4g} mm deep {what} (line {line}):"
-                    f" {depth / wide:.3g} times its diameter"
+                    f"{name} with the diameter {wide / MM:.6g} mm cuts {depth / MM:.4g} mm deep {what} (line"
+                    f" {line}): {depth / wide:.3g} times its diameter"
                 )
                 yield (
                     message,
