@@ -3,7 +3,7 @@
 Numba counts the references to an array at every call of a function that is given it, by an instruction that locks the
 memory; in functions of some dozen operations that is most of the time, and threads wait for each other.  A view that
 belongs to nobody is not counted.  Whoever calls the compiled code holds the arrays meanwhile, and no view outlives the
-call; an array that a function makes itself it has to ``hold``.
+call; an array that a function makes itself it has to ``keep_alive``.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def _typed(context: Any, array: Any) -> tuple[Any, Any]:
 
 
 @compiled
-def hold(array: Floats) -> int:
+def keep_alive(array: Floats) -> int:
     """Called after the last use of what is ``borrowed`` from an array of the same function: until here it exists."""
     return len(array)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 from postproc.base.units import MM
-from postproc.process.stock.borrowed import borrowed, hold
+from postproc.process.stock.borrowed import borrowed, keep_alive
 from postproc.process.stock.cells import Stock, lent_stock
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.contact import (
@@ -93,4 +93,4 @@ def collisions(
         time = j + 1 if stock.sweeps[j, REMOVES] > 0.0 else j
         profile = cutters.profiles[int(stock.sweeps[j, CUTTER])]
         found[k] = 1 if collides(stock, profile, part[k], pose, time) else 0
-    hold(own)
+    keep_alive(own)

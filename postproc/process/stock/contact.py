@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
-from postproc.process.stock.borrowed import borrowed, hold
+from postproc.process.stock.borrowed import borrowed, keep_alive
 from postproc.process.stock.cells import Stock, lent_stock, stock_distance
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.distance import (
@@ -238,7 +238,7 @@ def _set_node(
     """What the circle at the length ``s`` [m] of the element ``e`` of a profile adds, by the metre of profile."""
     own = np.zeros(12)
     _set_node_by(stock, cutter, e, s, pose, contact, node, borrowed(own))
-    hold(own)
+    keep_alive(own)
 
 
 @compiled
@@ -417,7 +417,7 @@ def find_contact(stock: Stock, cutter: SweepCutter, pose: Floats, contact: Float
                 else:
                     top += 1
                     nodes[top] = middle
-    hold(own)
+    keep_alive(own)
     contact[RATE] = total[0]
     for k in range(6):
         contact[FORCE + k] = total[1 + k]
@@ -443,4 +443,4 @@ def contacts(stock: Stock, cutters: SweepCutters, sweep: Ints, share: Floats, fo
         set_pose(stock.sweeps, j, share[k], cutters.headings[j], pose)
         profile = cutters.profiles[int(stock.sweeps[j, CUTTER])]
         find_contact(stock, SweepCutter(profile, cutters.laws[j], cutters.live[j], j), pose, found[k])
-    hold(own)
+    keep_alive(own)

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.base.arrays import Floats
-from postproc.process.stock.borrowed import borrowed, hold
+from postproc.process.stock.borrowed import borrowed, keep_alive
 from postproc.process.stock.bounds import set_bound
 from postproc.process.stock.cells import Stock, lent_stock
 from postproc.process.stock.compiled import compiled
@@ -117,8 +117,8 @@ def solve_pieces(stock: Stock, profiles: Floats, pieces: Pieces, nodes: Nodes, l
         displace_row(pieces.rows, p, whole, first, last, lever, AS_STRAIGHT, stock.sweeps[time])
         if len(stock.bounds):
             set_bound(stock.sweeps, stock.cutters, time, stock.bounds[time])
-    hold(own)
-    hold(numbers)
+    keep_alive(own)
+    keep_alive(numbers)
 
 
 @compiled

@@ -15,11 +15,11 @@ from postproc.cell import MotionFrames
 from postproc.process.force_profiles import ForceProfiles
 from postproc.process.stated_forces import BASE, FEED, StatedForces
 from postproc.process.stock.blank import Blank, box_blank, corners_of, cylinder_blank, mesh_blank
+from postproc.process.stock.contradictions import contradictions
 from postproc.process.stock.cutters import CUTTING, HOLDER, SHANK
 from postproc.process.stock.distance import AXIS, CUTTER, REMOVES, STEP, TIP_POINT, TURN
 from postproc.process.stock.engagement import EngagedMotions, engage, laws_of
 from postproc.process.stock.motion_sweeps import MotionSweeps, find_sweeps
-from postproc.process.stock.plausibility import contradictions
 from postproc.process.stock.saved_stock import Removed, read_stock, stock_bytes
 from postproc.process.stock.stl import read_stl
 from postproc.process.stock.stock_section import StockProcess, read_stock_process
