@@ -78,6 +78,7 @@ function showPart() {
   live.hidden = false;
   const canvas = byId('part'), view = new PartView(canvas, JSON.parse(place.textContent));
   if (!view.gl) { live.hidden = true; return; }
+  canvas.view = view; // for scripts beside the page's
   byId('part-static').hidden = true;
   listenToInput(view);
   const play = new Playback(view), said = byId('part-line');
