@@ -427,9 +427,9 @@ class Propagation:
             if one.name in READERS:
                 self._note_reading(one.start, state)
 
-    def _assign(self, target: Expression, given: Expression, state: ProgramState) -> None:
+    def _assign(self, target: Expression, source: Expression, state: ProgramState) -> None:
         evaluator = self._evaluator(state)
-        value = evaluator.value(given)
+        value = new = evaluator.value(source)
         variable, place = evaluator.assigned_place(target)
         if variable is None:
             return
@@ -439,7 +439,6 @@ class Propagation:
         old, kind = self._names.look(variable, state)
         if isinstance(old, UnknownData) and is_component(target):
             old = unknown_record(kind, evaluator.components, old)
-        new = value
         if isinstance(value, UnknownData) and NOT_CONSTANT not in value.reason:
             new = UnknownData(f"{shown}{NOT_CONSTANT}{value.reason}")
         changed = replaced(old, place, new, f"a part of {shown} is assigned that is not known")
