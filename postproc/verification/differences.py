@@ -311,7 +311,7 @@ def _other_external(
     start, end, here = one[np.maximum(row - 1, 0)], one[row], two[motions.row]
     start = np.where(np.isfinite(start), start, end)
     rate = np.abs(end - start) / np.maximum(simulator.original.desired_path.length[row], NEAR)[:, None]
-    # where the run passes beside the point that it states, so do the axes beside theirs
+    # where the run misses the point that it states, the axes miss theirs
     passed = np.append(RunPath.of(run).reach, 0.0)[motions.row + 1]
     near = np.maximum(passed, simulator.original.tolerance)[:, None]
     apart = np.abs(here - start - share * (end - start)) > SAME_EXTERNAL + rate * near

@@ -207,14 +207,14 @@ def gross_errors(final: Fit) -> tuple[Outlier, ...]:
 
 def _next_poses(request: DiagnoseRequest, measured: Measured, diagnosis: Diagnosis) -> NextPoses | None:
     """Poses, of those loads and targets that were used, at which the explanations disagree most; None where none do."""
-    offer = _candidate_setups(request, measured, diagnosis.search.base)
+    candidates = _candidate_setups(request, measured, diagnosis.search.base)
     # where the arm was it can go again
-    narrow = replace(offer, limits=_measured_ranges(measured.readings.q, offer.limits))
-    if measured.readings.deflection and not len(offer.loads) + len(offer.pulls):
+    narrow = replace(candidates, limits=_measured_ranges(measured.readings.q, candidates.limits))
+    if measured.readings.deflection and not len(candidates.loads) + len(candidates.pulls):
         return None  # what can be hung or pulled with is not known
     pairs = [(first, other) for first, *others in diagnosis.verdict.alternatives for other in others[:TRIED]]
     # poses that differ less are better than none
-    for offered in (narrow, offer, replace(offer, spread=0.0)):
+    for offered in (narrow, candidates, replace(candidates, spread=0.0)):
         tried = [_discriminating_poses(measured, diagnosis, offered, one, other) for one, other in pairs]
         plans = [plan for plan in tried if plan]
         best = max(plans, key=lambda plan: min(plan.separation), default=None)

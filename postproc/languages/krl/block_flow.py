@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from abc import abstractmethod
 
+from postproc.languages.core.motion_sources import ELSEWHERE, together
 from postproc.languages.krl.assignments import with_clause
 from postproc.languages.krl.execution_context import Flow, SplineBlock
 from postproc.languages.krl.expressions import Value
 from postproc.languages.krl.flow_frames import BlockFrame
 from postproc.languages.krl.lexing import NAME, SPLINES, Statement, cached, identifiers, is_integer, value_end
-from postproc.languages.krl.modal_state import ELSEWHERE, ModalState
+from postproc.languages.krl.modal_state import ModalState
 from postproc.languages.krl.open_blocks import BUDGET, OpenBlocks
 from postproc.languages.krl.program_blocks import Block
 from postproc.languages.krl.statement_effects import EVERYTHING, MODAL, Effect
@@ -84,7 +85,6 @@ class BlockFlow(OpenBlocks):
         long = self.steps > self.most_steps or block.end - block.start > BUDGET
         if frame.head is not None and long:
             frame.head = self._forgotten(frame.head, block)
-        frame.mark = run.rows.new_mark()
         return self._enter_pass(frame, item)
 
     def _open_spline(self, item: Statement, block: Block) -> None:
@@ -211,10 +211,10 @@ class BlockFlow(OpenBlocks):
         self._continue_with(frame.head)
         frame.exits = None
         if frame.before is not None:
-            run.rows.sources[frame.mark] = set(frame.before.state.sources)
+            frame.meeting.sources = set(frame.before.state.sources)
         if frame.head is None:
             return block.start + 1
-        run.state.sources = frozenset([frame.mark])
+        run.state.sources = frozenset([frame.meeting])
         if block.word == b"WHILE":
             value = run.value(item.code[5:])
             if value is not True:
@@ -301,7 +301,7 @@ class BlockFlow(OpenBlocks):
             self.reachable = True
             self.run.forget(EVERYTHING, f"after line {frame.block.line}, whose block is not understood")
             self.run.state.form = None
-        self.run.state.sources = self.run.rows.joined(sources | self.run.state.sources)
+        self.run.state.sources = together(sources | self.run.state.sources)
 
     def _leave_loop(self, frame: BlockFrame) -> None:
         """After the last pass of a loop that is followed."""
@@ -328,7 +328,7 @@ class BlockFlow(OpenBlocks):
                 self._call_functions(self._item(block.start))
             if again is not False:
                 back = run.flow()
-                run.rows.sources[frame.mark] |= back.state.sources
+                frame.meeting.sources |= back.state.sources
                 head = back if frame.head is None else run.raised(frame.head, back)
                 if head is not frame.head:
                     if self.steps > self.most_steps:

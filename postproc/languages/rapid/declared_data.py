@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from postproc.languages.core.reach import reached
 from postproc.languages.rapid.data_types import RECORDS, SPEEDS, STOP_KINDS, STOP_POINTS, ZONES, Components
 from postproc.languages.rapid.evaluation import Evaluator, Typed
 from postproc.languages.rapid.instructions import (
@@ -206,14 +207,7 @@ class Usage:
 
     def reached(self, names: Iterable[bytes]) -> set[bytes]:
         """What calls of routines may run: these, and what they call."""
-        seen: set[bytes] = set()
-        pending = list(names)
-        while pending:
-            one = pending.pop()
-            if one not in seen:
-                seen.add(one)
-                pending += self._own if self.is_late(one) else self.calls.get(one, ())
-        return seen
+        return reached(names, lambda one: self._own if self.is_late(one) else self.calls.get(one, ()))
 
     @staticmethod
     def is_late(name: bytes) -> bool:

@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from postproc.base.arrays import Floats, Ints, shared, sums
 from postproc.base.batches import blocks
 from postproc.base.document import Document
-from postproc.languages.core.motion_sources import Meeting, Source, distinguished, expanded
+from postproc.languages.core.comments_in_force import CONTRADICTED, VARYING
+from postproc.languages.core.motion_sources import ELSEWHERE, Meeting, Source, distinguished, expanded
 from postproc.languages.rapid.data_types import ABSENT
 from postproc.languages.rapid.declared_data import walk
 from postproc.languages.rapid.instructions import MOTIONS, OTHER_MOTIONS
 from postproc.languages.rapid.module_frames import ModuleFrames
 from postproc.languages.rapid.motion_facts import MotionFact, Problem, item_of, not_read, reason_of
-from postproc.languages.rapid.program_state import ELSEWHERE, VARYING, ProgramState
+from postproc.languages.rapid.program_state import ProgramState
 from postproc.languages.rapid.propagation import OTHER, Propagation
 from postproc.languages.rapid.quaternions import WORST
 from postproc.languages.rapid.syntax_tree import Instruction, PlainMotions, RapidRoutine
@@ -255,7 +256,7 @@ def _place(
     line = int(rows.lines[first])
     problem = fact.problem
     if problem is None and (fact.force is VARYING or fact.switch is VARYING):
-        problem = "RAP006", "the FORCE or COMPENSATE comment in force differs with the path of the program"
+        problem = "RAP006", CONTRADICTED
     if problem is not None:
         rows.refuse_all(these, problem)
     if fact.arguments is None:

@@ -8,7 +8,9 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats
 from postproc.base.document import Document
-from postproc.languages.core.motion_sources import Meeting, Source, distinguished, expanded
+from postproc.languages.core.comments_in_force import CONTRADICTED, VARYING
+from postproc.languages.core.frame_table import FrameTable
+from postproc.languages.core.motion_sources import ELSEWHERE, START, Meeting, Source, distinguished, expanded
 from postproc.languages.core.waits import Waits
 from postproc.languages.tp.position_data import (
     CARTESIAN,
@@ -21,9 +23,6 @@ from postproc.languages.tp.position_data import (
 from postproc.languages.tp.statement_flow import StatementFlow
 from postproc.languages.tp.tp_listing import NumberedStatement, TpListing
 from postproc.languages.tp.tp_propagation import (
-    CONTRADICTORY,
-    ELSEWHERE,
-    START,
     TpPropagation,
     TpState,
 )
@@ -66,7 +65,7 @@ class TpRows:
         self.waits = {int(self.row_of[one]): waits == Waits.YES for one, waits in run.waits.items()}
         self.axes: dict[int, tuple[float, ...]] = {}
         self.problems: dict[int, tuple[str, str]] = {}
-        self.frames: list[FrameRef] = []
+        self.frames = FrameTable()
         self.assumed: dict[int, str] = {}
 
     def _jumps(self, run: TpPropagation) -> dict[int, tuple[int, ...]]:
@@ -147,7 +146,6 @@ class RowBuilder:
         self.flow: StatementFlow = run.flow
         self.rows = _rows(run)
         self.assigned, self.every_point, self.frames_set = assigned_data(self.flow.statements)
-        self._indices: dict[tuple[bool, int], int] = {}
 
     def build(self) -> TpRows:
         for row, at in enumerate(self.rows.at.tolist()):
@@ -164,10 +162,8 @@ class RowBuilder:
             rows.refuse(row, "FTP007", "the structure of the program is not understood")
         elif state is None:
             rows.refuse(row, "FTP009", "the flow that the program defines does not reach it")
-        elif CONTRADICTORY in (state.force, state.switch):
-            rows.refuse(
-                row, "FTP006", "the FORCE or COMPENSATE comment in force differs with the path of the program"
-            )
+        elif VARYING in (state.force, state.switch):
+            rows.refuse(row, "FTP006", CONTRADICTED)
         elif state.displaced:
             names = ", ".join(sorted(name.decode("latin-1") for name in state.displaced))
             rows.refuse(row, "FTP008", f"its target may be displaced ({names})")
@@ -278,11 +274,7 @@ class RowBuilder:
             return -1
         if selected is None and row not in rows.problems:
             rows.assumed.setdefault(row, name)
-        key = (is_tool, number)
-        if key not in self._indices:
-            self._indices[key] = len(rows.frames)
-            rows.frames.append(FrameRef(number, None, int(rows.lines[row])))
-        return self._indices[key]
+        return rows.frames.index((is_tool, number), lambda: FrameRef(number, None, int(rows.lines[row])))
 
     def _configuration(self, row: int, group: PositionGroup, kind: int) -> tuple[int, int]:
         """Flags and turns of the configuration as numbers, -1 where they are not known."""

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from functools import partial
 
 import numpy as np
 
-from postproc.base.arrays import Bools, FewRows
+from postproc.base.arrays import Bools
 from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.base.geometry import rotation_from_abc
 from postproc.base.units import DEG, MM
 from postproc.languages.core.motion_sources import Meeting
-from postproc.languages.core.row_facts import OTHER_PATHS, grouped, moving_external, only_used
+from postproc.languages.core.row_facts import (
+    OTHER_PATHS,
+    LockedRows,
+    axis_targets,
+    grouped,
+    moving_external,
+    only_used,
+)
 from postproc.languages.tp.tp_arcs import arcs_of
 from postproc.languages.tp.tp_listing import TpListing
 from postproc.languages.tp.tp_propagation import TpPropagation
@@ -49,14 +57,10 @@ def toolpath_of(
             kind=kinds,
             position=position,
             rotation=rotation,
-            axes=FewRows(
-                np.array(sorted(rows.axes), np.int32),
-                np.array([rows.axes[row] for row in sorted(rows.axes)]).reshape(-1, 6) * DEG,
-                n,
-            ),
+            axes=axis_targets(rows.axes, n),
             base=rows.base,
             tool=rows.tool,
-            frames=tuple(rows.frames),
+            frames=tuple(rows.frames.refs),
             external=rows.external,
         ),
         line=rows.lines,
@@ -127,33 +131,26 @@ def _locked(
     runs: Mapping[int, tuple[int, ...]],
 ) -> dict[int, Finding]:
     """Rows from whose end a refused arc starts, or where the program reads the position."""
-    locked: dict[int, Finding] = {}
+    locked = LockedRows(partial(row_finding, document, rows), "FTP012", "FTP002")
 
-    def lock(row: int, code: str, message: str) -> None:
-        if row not in rows.problems:
-            locked.setdefault(row, row_finding(document, rows, row, code, message))
+    def free(places: Iterable[int]) -> list[int]:
+        return [row for row in places if row >= 0 and row not in rows.problems]
 
     visited: set[Meeting] = set()
     done: set[int] = set()  # first rows of runs
     for row in rows.problems:
         move = rows.moves[row]
-        if move is None or move.form not in (b"C", b"A"):
-            continue
-        run_of = runs.get(row, ())
-        others = () if not run_of or run_of[0] in done else run_of
-        done.update(others[:1])
-        for one in (*rows.starts_of(row, visited), *others):
-            message = f"the arc in line {rows.lines[row]} starts at this end point and is not corrected"
-            lock(one, "FTP012", message)
+        if move is not None and move.form in (b"C", b"A"):
+            run_of = runs.get(row, ())
+            others = () if not run_of or run_of[0] in done else run_of
+            done.update(others[:1])
+            locked.start_arc(free((*rows.starts_of(row, visited), *others)), int(rows.lines[row]))
     visited = set()
     for row, move in enumerate(rows.moves):
-        if move is None or not move.relative:
-            continue
-        for one in rows.starts_of(row, visited):
-            lock(one, "FTP008", f"the motion in line {rows.lines[row]} counts from its end (INC)")
+        if move is not None and move.relative:
+            message = f"the motion in line {rows.lines[row]} counts from its end (INC)"
+            locked.add(free(rows.starts_of(row, visited)), "FTP008", message)
     visited = set()
     for at, places in sorted(run.reads.items()):
-        for one in rows.rows_of(places, visited):
-            message = f"line {listing.statements[at].line} reads the end position of this motion"
-            lock(one, "FTP002", message)
-    return dict(sorted(locked.items()))
+        locked.are_read(free(rows.rows_of(places, visited)), listing.statements[at].line)
+    return locked.done()

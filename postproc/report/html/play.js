@@ -49,7 +49,7 @@ class Playback {
     this.frame = requestAnimationFrame((next) => this.step(next));
   }
 
-  // A motion was chosen: by somebody, or on the way.
+  // A motion was chosen: by somebody, or by the playback.
   chosen() {
     this.view.share = 1;
     if (this.playing && !this.own) this.at = this.length[chosen];
