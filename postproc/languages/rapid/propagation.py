@@ -429,7 +429,7 @@ class Propagation:
 
     def _assign(self, target: Expression, expression: Expression, state: ProgramState) -> None:
         evaluator = self._evaluator(state)
-        value = new = evaluator.value(expression)
+        value = evaluator.value(expression)
         variable, place = evaluator.assigned_place(target)
         if variable is None:
             return
