@@ -21,6 +21,7 @@ NEARBY = 5.0 * MM
 MARCHES, ROUNDS, SMOOTH = 3, 8, 6
 REACHES, CLOSE = (1.1, 3.3, 10.0, 30.0, 100.0), (0.5, 3.0, 10.0)
 BETWEEN = (0.1, *CLOSE, 30.0)
+FROM_GUESS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 """Steps of the grid to either side in which a place is looked for again, one after the other."""
 SETTLED = 1e-10
 APART, NEAREST, MOST = 0.01 * MM, 1e-7, 200_000
@@ -30,6 +31,9 @@ BESIDE, AROUND, PARTS, TRIED, WALKS = 0.05 * MM, 1.0 * MM, 400, 3, 60
 """Where a place leaps there may be two: of samples so far around it all places across the leap, and so much beside it,
 are looked for, on so many parts, and so many are tried; the leap goes on then to where both are as near, in so many
 rounds at most."""
+
+SPREAD = np.concatenate([side * 1e-8 * 2.0 ** np.arange(14) for side in (-1, 1)])
+"""[m] Further places beside either side of a leap: two may be there close to each other."""
 
 
 class Tools:
@@ -115,9 +119,9 @@ def divided(
             break
         k = np.searchsorted(label, more) - 1
         low, high = np.sort(np.stack([place[k], place[k + 1]]), axis=0)
-        margin = 0.1 * (high - low) + 0.1 * APART
-        between = np.stack([low - margin, high + margin], axis=1)
-        there = nearest_between(wanted, cut, one, 0.5 * (low + high), tools_at(more), between, PARTS // 10)
+        margin = (0.1 * (high - low) + 0.1 * APART)[:, None]
+        between, middle = np.stack([low, high], axis=1), 0.5 * (low + high)
+        there = nearest_between(wanted, cut, one, middle, tools_at(more), between, margin, PARTS // 10)
         good = np.isfinite(there)
         missing = np.append(missing, more[~good])
         order = np.argsort(np.append(label, more[good]), kind="stable")
@@ -144,8 +148,8 @@ def nearest_across_leaps(
             rows = np.flatnonzero(np.abs(label - label[k]) < AROUND)
             tools = tools_at(label[rows])
             low, high = np.sort(place[k : k + 2])
-            between = np.tile([low - BESIDE, high + BESIDE], (len(rows), 1))
-            found = nearest_between(wanted, cut, one, place[rows], tools, between, PARTS)
+            between = np.tile([low, high], (len(rows), 1))
+            found = nearest_between(wanted, cut, one, place[rows], tools, between, BESIDE, PARTS)
             other = np.where(np.isfinite(found), found, place[rows])
             nearer = away(rows, tools, other) < away(rows, tools, place[rows]) - SETTLED
             place[rows] = np.where(nearer, other, place[rows])
@@ -164,19 +168,24 @@ def nearest_between(
     place: np.ndarray,
     tools: Tools,
     between: np.ndarray,
+    beside: float | np.ndarray,
     parts: int,
 ) -> np.ndarray:
-    """Of all places between two labels (S, 2), looked for on so many ``parts``, the nearest (S,) of each of the
-    ``tools``, NaN without one; the forces of ``place`` (S,) are the first guess."""
+    """Of all places between two labels (S, 2), and ``beside`` these [m], looked for on so many ``parts``, the nearest
+    (S,) of each of the ``tools``, NaN without one; the forces of ``place`` (S,) are the first guess."""
     ends = wanted.start[cut[0]], wanted.start[cut[1] + 1]
-    low, high = np.clip(between, *ends).T
+    low, high = np.clip(between + beside * np.array([-1.0, 1.0]), *ends).T
+    sides = between.T
     wrench = one.at(place)
     there, _, gives = tools.loaded(wrench)
     size = max(1, 200_000 // parts)
     tried = np.full((TRIED, len(place)), np.nan)
     for first in range(0, len(place), size):
         rows = slice(first, first + size)
-        at = np.linspace(low[rows], high[rows], parts + 1, axis=1)
+        even = np.linspace(low[rows], high[rows], parts + 1, axis=1)
+        beside_sides = [side[rows, None] + SPREAD for side in sides]
+        at = np.sort(np.concatenate([even, *beside_sides], axis=1), axis=1)
+        at = np.clip(at, low[rows, None], high[rows, None])
         along = at.ravel()
         force = one.at(along).reshape(*at.shape, 6) - wrench[rows, None]
         beside = there[rows, None] + force @ gives[rows].swapaxes(1, 2)
@@ -187,16 +196,16 @@ def nearest_between(
         k, here = k[order], here[order]
         number = np.arange(len(k)) - np.searchsorted(k, k)
         k, here, number = (v[number < TRIED] for v in (k, here, number))
-        share = ahead[k, here] / (ahead[k, here] - ahead[k, here + 1])
+        share = ahead[k, here] / np.maximum(ahead[k, here] - ahead[k, here + 1], 1e-15)
         tried[number, first + k] = at[k, here] + (at[k, here + 1] - at[k, here]) * share
     best, least = np.full(len(place), np.nan), np.full(len(place), np.inf)
     for start in tried:
         none = np.isnan(start)
         found, gone = settle_places(
-            wanted, cut, one, np.where(none, place, start), tools.loaded, (0.02, 0.1, 0.5)
+            wanted, cut, one, np.where(none, place, start), tools.loaded, FROM_GUESS
         )
         away = np.linalg.norm(tools.loaded(one.at(found))[0] - wanted.points(found, *cut), axis=1)
-        away = np.where(none | gone, np.inf, away)
+        away = np.where(none | gone | (np.abs(found - start) > BESIDE), np.inf, away)
         best, least = np.where(away < least, found, best), np.minimum(least, away)
     return best
 

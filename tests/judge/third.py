@@ -1,18 +1,19 @@
 """A third opinion on how far a written program's tool is off the wanted path, by brute force.
 
-``python -m tests.judge --third ...`` has it as a further column.  The error, as the documents state it: the force
-belongs to the place s on the wanted path g that the *deflected* tool is beside, and it is that force F(s) which deflects
-the tool x of the command c,
+``python -m tests.judge --third yes ...`` has it as a further column.  The error, as the documents state it: the force
+belongs to the place s on the wanted path g that the *deflected* tool is beside, and it is that force F(s) which
+deflects the tool x of the command c,
 
     (x(c, F(s)) - g(s)) . g'(s) = 0,  from ahead to behind as s grows,
 
 and |x - g| is the error.  Of several such places the nearest to the tool counts.  The largest error is the least upper
 bound along the commands: where the place leaps, both sides of the leap count.
 
-Here the wanted path is a set of points, so dense that nothing has to be looked for: at every one of them within a window
-the tool of every command is put under the force of that point, and all changes of sign are places.  There is no guess
-but the window, no grid of displacements, no linear tool, no fixed point.  What a path, a force and a loaded tool are is
-asked of the judge's reader, force and chain, about which ``verify`` and the judge agree; the places are its own."""
+Here the wanted path is a set of points, so dense that nothing has to be looked for: at every one of them within a
+window the tool of every command is put under the force of that point, and all changes of sign are places.  There is no
+guess but the window, no grid of displacements, no linear tool, no fixed point.  What a path, a force and a loaded tool
+are is asked of the judge's reader, force and chain, about which ``verify`` and the judge agree; the places are its
+own."""
 
 from __future__ import annotations
 
@@ -30,8 +31,8 @@ from .reader import read
 from .robot import Robot
 
 STEP, POINT, FINE, MANY = 0.1 * MM, 0.02 * MM, 1e-6, 100
-"""[m] Of the commands, of the wanted path's points, and of so many of these to either side of the places of two commands
-that have another one put between them."""
+"""[m] Of the commands, of the wanted path's points, and of so many of these to either side of the places of two
+commands that have another one put between them."""
 BATCH, HALVINGS = 16, 26
 LEAP = 0.01 * MM
 """By how much more than the command a place may go on between two commands without a look at those between."""
@@ -58,7 +59,14 @@ class Cut:
     """One cut of the wanted path, and the same cut of the program."""
 
     def __init__(self, wanted: Path, cut: tuple, path: Path, rows: tuple, force: Field, nodes: tuple) -> None:
-        self.wanted, self.cut, self.path, self.rows, self.force, self.nodes = wanted, cut, path, rows, force, nodes
+        self.wanted, self.cut, self.path, self.rows, self.force, self.nodes = (
+            wanted,
+            cut,
+            path,
+            rows,
+            force,
+            nodes,
+        )
         self.low, self.high = wanted.start[cut[0]], wanted.start[cut[1] + 1]
         self.points = self._dense(wanted, cut, POINT)
 

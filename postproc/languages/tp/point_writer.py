@@ -16,11 +16,11 @@ from postproc.languages.core.plan_rows import BLOCK, blocks
 from postproc.languages.dialect import EditedTargets, Plan, Program, Role, WritingSettings
 from postproc.languages.tp.position_data import TpPosition
 from postproc.languages.tp.tp_plan import NewPoints, SixNumbers, TpPlanNumbers, value_and_decimals
-from postproc.languages.tp.tp_statements import TpMove
+from postproc.languages.tp.tp_statements import INSERTED_CNT, TpMove
 from postproc.toolpath import Kind
 
 HELP = "Give each motion its own point."
-FLOWING = b"CNT100"
+FLOWING = b"CNT%d" % INSERTED_CNT
 """Of inserted points at which the robot does not stop, where the motion itself does."""
 
 
