@@ -18,7 +18,7 @@ from .cell import Cell
 from .force import RULE, STRETCHED, Field
 from .motion import MM, Motion
 from .path import Path
-from .placing import BETWEEN, Tools, divided, find_places, nearest_across_leaps, settle_places
+from .placing import Tools, beside_neighbours, divided, find_places, nearest_across_leaps
 from .reader import read
 from .robot import Robot, check_on_mujoco, rotation_vectors, rotations
 
@@ -222,10 +222,8 @@ def _along(wanted: Path, cut: tuple, path: Path, rows: tuple, one: Field, nodes:
         distance = np.linalg.norm(tools.loaded(one.at(place))[0] - wanted.points(place, *cut), axis=1)
         more = np.union1d(_beside_worst(label, distance), _at_vertices(wanted, cut, label, place))
         more = np.setdiff1d(more, label)
-        finer = at(more)
-        found, gone = settle_places(
-            wanted, cut, one, np.interp(more, label, place), finer.loaded, reaches=BETWEEN
-        )
+        found = beside_neighbours(wanted, cut, one, (label, place), more, at(more))
+        gone = np.isnan(found)
         unsettled = label[lost]
         label, place = np.append(label, more[~gone]), np.append(place, found[~gone])
         order = np.argsort(label, kind="stable")

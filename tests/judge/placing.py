@@ -21,13 +21,13 @@ NEARBY = 5.0 * MM
 MARCHES, ROUNDS, SMOOTH = 3, 8, 6
 REACHES, CLOSE = (1.1, 3.3, 10.0, 30.0, 100.0), (0.5, 3.0, 10.0)
 BETWEEN = (0.1, *CLOSE, 30.0)
-FROM_GUESS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
+FROM_GUESS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 6.0)
 """Steps of the grid to either side in which a place is looked for again, one after the other."""
 SETTLED = 1e-10
 APART, NEAREST, MOST = 0.01 * MM, 1e-7, 200_000
 """By how much more or less than the program the places of two samples beside each other may go on without samples
 between them, how near these may come to each other [m], and how many there may be."""
-BESIDE, AROUND, PARTS, TRIED, WALKS = 0.05 * MM, 1.0 * MM, 400, 3, 60
+BESIDE, OFF_GUESS, AROUND, PARTS, TRIED, WALKS = 0.05 * MM, 0.3 * MM, 1.0 * MM, 400, 3, 60
 """Where a place leaps there may be two: of samples so far around it all places across the leap, and so much beside it,
 are looked for, on so many parts, and so many are tried; the leap goes on then to where both are as near, in so many
 rounds at most."""
@@ -117,16 +117,25 @@ def divided(
         more = np.setdiff1d(0.5 * (label[k] + label[k + 1]), missing)
         if not len(more):
             break
-        k = np.searchsorted(label, more) - 1
-        low, high = np.sort(np.stack([place[k], place[k + 1]]), axis=0)
-        margin = (0.1 * (high - low) + 0.1 * APART)[:, None]
-        between, middle = np.stack([low, high], axis=1), 0.5 * (low + high)
-        there = nearest_between(wanted, cut, one, middle, tools_at(more), between, margin, PARTS // 10)
+        there = beside_neighbours(wanted, cut, one, (label, place), more, tools_at(more))
         good = np.isfinite(there)
         missing = np.append(missing, more[~good])
         order = np.argsort(np.append(label, more[good]), kind="stable")
         label, place = np.append(label, more[good])[order], np.append(place, there[good])[order]
     return label, place
+
+
+def beside_neighbours(
+    wanted: Path, cut: tuple, one: Field, known: tuple[np.ndarray, np.ndarray], more: np.ndarray, tools: Tools
+) -> np.ndarray:
+    """The places (M,) of further labels (M,), ``tools`` theirs, between those of the ``known`` labels and places beside
+    them; NaN where there is none."""
+    label, place = known
+    k = np.clip(np.searchsorted(label, more) - 1, 0, len(label) - 2)
+    low, high = np.sort(np.stack([place[k], place[k + 1]]), axis=0)
+    margin = (0.1 * (high - low) + 0.1 * APART)[:, None]
+    between, middle = np.stack([low, high], axis=1), 0.5 * (low + high)
+    return nearest_between(wanted, cut, one, middle, tools, between, margin, PARTS // 10)
 
 
 def nearest_across_leaps(
@@ -149,12 +158,16 @@ def nearest_across_leaps(
             tools = tools_at(label[rows])
             low, high = np.sort(place[k : k + 2])
             between = np.tile([low, high], (len(rows), 1))
-            found = nearest_between(wanted, cut, one, place[rows], tools, between, BESIDE, PARTS)
-            other = np.where(np.isfinite(found), found, place[rows])
-            nearer = away(rows, tools, other) < away(rows, tools, place[rows]) - SETTLED
-            place[rows] = np.where(nearer, other, place[rows])
-            walked |= bool(nearer.any())
-            if not nearer.any():
+            moved = False
+            # under the force of either side too, as the tool is not linear in it
+            for guess in (place[rows].copy(), np.full(len(rows), low), np.full(len(rows), high)):
+                found = nearest_between(wanted, cut, one, guess, tools, between, BESIDE, PARTS)
+                other = np.where(np.isfinite(found), found, place[rows])
+                nearer = away(rows, tools, other) < away(rows, tools, place[rows]) - SETTLED
+                place[rows] = np.where(nearer, other, place[rows])
+                moved |= bool(nearer.any())
+            walked |= moved
+            if not moved:
                 as_near.add(label[k])
         if not walked:
             break
@@ -205,7 +218,7 @@ def nearest_between(
             wanted, cut, one, np.where(none, place, start), tools.loaded, FROM_GUESS
         )
         away = np.linalg.norm(tools.loaded(one.at(found))[0] - wanted.points(found, *cut), axis=1)
-        away = np.where(none | gone | (np.abs(found - start) > BESIDE), np.inf, away)
+        away = np.where(none | gone | (np.abs(found - start) > OFF_GUESS), np.inf, away)
         best, least = np.where(away < least, found, best), np.minimum(least, away)
     return best
 
