@@ -150,8 +150,7 @@ def nearest_across_leaps(
     as_near: set[float] = set()
     for _ in range(WALKS):
         walked = False
-        apart = (np.abs(np.diff(place) - np.diff(label)) > APART) & (np.diff(label) < 2 * NEAREST)
-        for k in np.flatnonzero(apart):
+        for k in np.flatnonzero(np.abs(np.diff(place) - np.diff(label)) > APART):
             if label[k] in as_near:
                 continue
             rows = np.flatnonzero(np.abs(label - label[k]) < AROUND)
@@ -214,9 +213,7 @@ def nearest_between(
     best, least = np.full(len(place), np.nan), np.full(len(place), np.inf)
     for start in tried:
         none = np.isnan(start)
-        found, gone = settle_places(
-            wanted, cut, one, np.where(none, place, start), tools.loaded, FROM_GUESS
-        )
+        found, gone = settle_places(wanted, cut, one, np.where(none, place, start), tools.loaded, FROM_GUESS)
         away = np.linalg.norm(tools.loaded(one.at(found))[0] - wanted.points(found, *cut), axis=1)
         away = np.where(none | gone | (np.abs(found - start) > OFF_GUESS), np.inf, away)
         best, least = np.where(away < least, found, best), np.minimum(least, away)
