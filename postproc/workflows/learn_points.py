@@ -195,6 +195,7 @@ def match(
     before = np.maximum(row - 1, 0)
     around = Circumstances(
         job.corners.at(row, points.share, job.radius[row]),
+        job.corners.sigma_at(row, points.share, job.radius[row]),
         job.time[before] + points.share * (job.time[row] - job.time[before]),
     )
     return Matched(
