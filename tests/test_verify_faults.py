@@ -1,11 +1,12 @@
 """Faults planted in written programs: ``verify`` rejects every one of them (see ``planted_faults``)."""
 
 import pytest
-from judge.cases import CASES, FIVE_AXIS, gcode
+from judge.cases import CASES, FIVE_AXIS, gcode, straight
 from judge.drawn import drawn
 from judge.further_cases import FURTHER
 from planted_faults import SAMPLES, Written
 
+from postproc.base.findings import Refusal
 from postproc.workflows.preparation import Request
 from postproc.workflows.program import compensate
 from postproc.workflows.verify import verify
@@ -124,7 +125,11 @@ def test_an_original_that_has_no_figure_is_no_fault_of_what_was_written(tmp_path
 
 @pytest.mark.parametrize(
     ("old", "new"),
-    [(" C_DIS", " C_VEL"), ("$APO.CDIS=0.5", "$APO.CDIS=0.6"), ("$APO.CDIS=0.5", "$APO.CDIS=0.5\n$APO.CVEL=50")],
+    [
+        (" C_DIS", " C_VEL"),
+        ("$APO.CDIS=0.5", "$APO.CDIS=0.6"),
+        ("$APO.CDIS=0.5", "$APO.CDIS=0.5\n$APO.CVEL=50"),
+    ],
 )
 def test_another_approximation_is_rejected(old, new, tmp_path):
     """However little it moves the path, and where nobody knows by how much."""
