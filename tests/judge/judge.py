@@ -308,7 +308,7 @@ def _missed(wanted: Path, cut: tuple, place: np.ndarray, there: np.ndarray) -> f
 def _backwards(
     path: Path, rows: tuple, motion: np.ndarray, place: np.ndarray, wanted: Path, cut: tuple
 ) -> list[int]:
-    """Motions of a cut that lead against the feed of the original's path, where they begin and where they end."""
+    """Motions of a cut that lead against the feed of the original's path, where they begin, in their middle and where they end."""
     found = []
     first = np.searchsorted(motion, np.arange(rows[0], rows[1] + 2))
     for i in range(rows[0], rows[1] + 1):
@@ -316,7 +316,7 @@ def _backwards(
         way = path.place[i, 1] - path.place[i, 0]
         if b <= a or path.arc[i]:
             continue
-        feed = wanted.direction(place[[a, b]], *cut)
+        feed = wanted.direction(place[[a, (a + b) // 2, b]], *cut)
         feed /= np.linalg.norm(feed, axis=1, keepdims=True)
         if (feed @ way < -BACKWARDS).all():
             found.append(i)
