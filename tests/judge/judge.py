@@ -308,7 +308,8 @@ def _missed(wanted: Path, cut: tuple, place: np.ndarray, there: np.ndarray) -> f
 def _backwards(
     path: Path, rows: tuple, motion: np.ndarray, place: np.ndarray, wanted: Path, cut: tuple
 ) -> list[int]:
-    """Motions of a cut that lead against the feed of the original's path, where they begin, in their middle and where they end."""
+    """Motions of a cut that lead against the feed of the original's path: where they begin, in their middle, at their
+    end."""
     found = []
     first = np.searchsorted(motion, np.arange(rows[0], rows[1] + 2))
     for i in range(rows[0], rows[1] + 1):
