@@ -15,10 +15,10 @@ from postproc.languages.core.plan_rows import BLOCK, PlannedNumbers, TargetWrite
 from postproc.languages.dialect import EditedTargets, Plan, Program, Role, WritingSettings
 from postproc.languages.tp.position_data import TpPosition
 from postproc.languages.tp.tp_plan import NewPoints, TpPlanNumbers, new_literals
-from postproc.languages.tp.tp_statements import TpMove
+from postproc.languages.tp.tp_statements import INSERTED_CNT, TpMove
 from postproc.toolpath import Kind
 
-FLOWING = b"CNT100"
+FLOWING = b"CNT%d" % INSERTED_CNT
 """Of inserted points at which the robot does not stop, where the motion itself does."""
 
 

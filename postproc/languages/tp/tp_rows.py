@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 import numpy as np
@@ -28,6 +29,9 @@ from postproc.languages.tp.tp_propagation import (
 )
 from postproc.languages.tp.tp_statements import PositionUse, StatementNotRead, TpMove, TpStatement
 from postproc.toolpath import LOST, FrameRef, Kind
+
+_CR = 1e6
+"""Numbers of registers that have a distance are this far from those of registers that have a number of CNT."""
 
 TURNS = 50
 """Turns of an axis from -50 to 49 are kept as numbers."""
@@ -134,6 +138,21 @@ class TpRows:
             ends = surely and bool(continues[row])
             blend[before], stops[before] = (0.0 if ends else np.nan), ends
         return blend, stops
+
+    def approximation_numbers(self) -> Floats:
+        """(N,) numbers of CNT; below zero those of the registers that have the number of CNT, or of CR, for which the
+        distance is not known; NaN for FINE and for CR with its distance."""
+        numbers = np.full(len(self), np.nan)
+        for row, move in enumerate(self.moves):
+            if move is None or move.corner[0] == b"FINE":
+                continue
+            word, value = move.corner
+            if value is None:
+                digits = re.search(rb"R\[\s*(\d+)", move.termination)
+                numbers[row] = -1.0 - (float(digits[1]) if digits else 0.0) - (_CR if word == b"CR" else 0.0)
+            elif word == b"CNT":
+                numbers[row] = value
+        return numbers
 
 
 class RowBuilder:

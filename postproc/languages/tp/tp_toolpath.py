@@ -26,6 +26,7 @@ from postproc.languages.tp.tp_listing import TpListing
 from postproc.languages.tp.tp_propagation import TpPropagation
 from postproc.languages.tp.tp_remarks import annotate
 from postproc.languages.tp.tp_rows import TpRows
+from postproc.languages.tp.tp_statements import INSERTED_CNT
 from postproc.toolpath import (
     Configuration,
     EditConstraints,
@@ -67,6 +68,7 @@ def toolpath_of(
         speeds=MotionSpeeds(rows.feed * MM),
         sequence=MotionSequence(
             approximation=blend * MM,
+            approximation_number=rows.approximation_numbers(),
             stops=stops,
             continues=continues,
             predecessors={
@@ -80,6 +82,7 @@ def toolpath_of(
             refused=refused,
             locked=_locked(document, listing, run, rows, runs),
             no_insert_before=_not_before(rows, continues, refused),
+            inserted_number=INSERTED_CNT,
         ),
         orientation_control=OrientationControl(
             mode=np.where(wrist, OrientationMode.JOINT, OrientationMode.VAR).astype(np.int8)
