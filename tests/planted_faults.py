@@ -136,6 +136,9 @@ PANEL = [
     angle(P, r"LIN \{X .*Z 50\.", 0, "Z", 0.1),
     angle(P, r"LIN \{X .*Z 50\.", 0, "A", 0.1),
     angle(P, r"PTP \{A1", 0, "A1", 0.1),
+    other(P, CUT, 37, " C_DIS", " C_VEL"),
+    other(P, r"\$APO.CDIS=", 0, "CDIS=", "CDIS=1"),
+    other(P, r"\$APO.CDIS=", 0, "$APO.CDIS=", "$APO.CVEL=50\n$APO.CDIS="),
 ]
 
 S, D, POINT = "taught.src", "taught.dat", r"DECL E6POS XP"
@@ -153,6 +156,8 @@ TAUGHT = [
     other(D, r"DECL FDAT FP4=", 0, "TOOL_NO 1", "TOOL_NO 2"),
     other(D, r"DECL FDAT FP4=", 0, "BASE_NO 1", "BASE_NO 2"),
     other(S, r"^LIN XP3 C_DIS", 0, " C_DIS", ""),
+    other(S, r"^LIN XP3 C_DIS", 0, " C_DIS", " C_ORI"),
+    other(D, r"APO_DIST", 0, "APO_DIST ", "APO_DIST 1"),
 ]
 
 M = "bracket.src"
@@ -184,6 +189,8 @@ POCKET = [
     other(G, r"^G21", 0, "G54", "G55"),
     other(G, r"^G3 .*X", 2, "G3", "G2"),
     other(G, FEED, 9, "X", "Z-1.9 X"),
+    other(G, FEED, 12, "X", "G64 P0.3 X"),
+    other(G, r"^G21", 0, "G21", "G61 G21"),
 ]
 
 R, MOVE_L, MOVE_C = "pocket.mod", r"MoveL \[\[.*v50", r"MoveC "
@@ -203,6 +210,7 @@ RAPID = [
     copied(R, MOVE_L, 2),
     other(R, MOVE_L, 1, "v50", "v60"),
     other(R, MOVE_L, 2, "z1", "fine"),
+    other(R, MOVE_L, 1, "z1", "z5"),
     other(R, r"MoveL Offs", 0, "0,0,10", "0,0,9.9"),
     other(R, "wobjdata wPart", 0, "[1600,-80,900]", "[1600.1,-80,900]"),
 ]
@@ -223,6 +231,10 @@ TP = [
     copied(T, r":L P\[10\]", 0),
     other(T, r":L P\[7\]", 0, "50mm", "60mm"),
     other(T, r":L P\[10\]", 0, "CNT100", "FINE"),
+    other(T, r":L P\[10\]", 0, "CNT100", "CNT50"),
+    other(T, r":L P\[7\]", 0, "CNT100", "CNT99"),
+    other(T, r":L P\[7\]", 0, "CNT100", "CR5"),
+    other(T, r":L P\[10\]", 0, "CNT100", "CNT R[1]"),
     other(T, r":L P\[7\]", 0, "P[7]", "P[10]"),
     other(T, r"UTOOL_NUM=1", 0, "UTOOL_NUM=1", "UTOOL_NUM=2"),
 ]

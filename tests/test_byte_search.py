@@ -15,8 +15,8 @@ PATTERNS = [rb"ab", rb"a+b", rb"(?<=a)b", rb"b(?!a)", rb"a[ab]*+(?!c)", rb"\bab\
 @pytest.mark.parametrize("pattern", PATTERNS)
 @given(st.lists(st.sampled_from([b"a", b"b", b"c", b" "]), max_size=40).map(b"".join), st.integers(1, 9))
 def test_every_occurrence_is_found_once(pattern, raw, piece):
-    compiled, before = re.compile(pattern), (byte_search.PIECE, byte_search.MAX_LINE)
-    byte_search.PIECE, byte_search.MAX_LINE = piece, 40
+    compiled, before = re.compile(pattern), (byte_search.CHUNK, byte_search.MAX_LINE)
+    byte_search.CHUNK, byte_search.MAX_LINE = piece, 40
     try:
         expected = [found.start() for found in compiled.finditer(raw)]
         assert list(occurrences(compiled, raw)) == expected
@@ -24,4 +24,4 @@ def test_every_occurrence_is_found_once(pattern, raw, piece):
         for start in range(len(raw) + 1):
             assert find_word(raw, b"ab", start) == raw.find(b"ab", start)
     finally:
-        byte_search.PIECE, byte_search.MAX_LINE = before
+        byte_search.CHUNK, byte_search.MAX_LINE = before

@@ -135,6 +135,30 @@ def test_a_small_program_loads_what_it_needs(tmp_path):
     }
 
 
+def test_a_small_program_is_not_searched_for_circles(tmp_path):
+    """What the start loads stays, and what is there at the end goes with the process: neither is collected."""
+    code = (
+        "import atexit, gc, sys\nfrom postproc.cli.main import run\n"
+        "before = gc.get_stats()[0]['collections']\n"
+        "atexit.register(lambda: print(gc.get_stats()[0]['collections'] - before, gc.get_count()[0],"
+        " gc.get_freeze_count()))\nrun()"
+    )
+    words = [sys.executable, "-c", code, str(program(tmp_path, "krl", 20)), "--force", "-q"]
+    done = subprocess.run(words, capture_output=True, check=True, text=True)
+    collections, young, frozen = map(int, done.stdout.split())
+    assert collections == 0
+    assert young < 100 < 10_000 < frozen
+
+
+def test_the_collector_works_as_always_after_the_start():
+    code = (
+        "import gc\nfrom postproc.base.memory import LOADED, collect_late\n"
+        "usual = gc.get_threshold()\ncollect_late()\nassert gc.get_threshold()[0] == LOADED\n"
+        "kept = [[] for _ in range(LOADED + 1000)]\nassert gc.get_threshold() == usual and not gc.callbacks"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
 def test_as_a_module():
     done = subprocess.run([*COMPENSATE, "--version"], capture_output=True, text=True)
     assert (done.returncode, done.stdout.split()[0]) == (0, "compensate,")

@@ -17,7 +17,7 @@ from postproc.compensation.path_comparison import evaluate_transitions
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.ramp_points import NEVER
 from postproc.compensation.ramped_forces import add_force_ramps
-from postproc.compensation.rounded_path import RoundedOutput
+from postproc.compensation.rounded_path import RoundedOutput, original
 from postproc.compensation.subdivide import subdivide
 from postproc.compensation.subdivision import Limits, Subdivision
 from postproc.toolpath import EditConstraints, Kind, Role
@@ -176,6 +176,37 @@ def test_a_corner_is_evaluated_before_and_after_its_point(at: float) -> None:
     expected = output.deviations(segment, away if at > 0 else 1.0 - away).shift
     assert np.linalg.norm(expected) > 1e-7
     np.testing.assert_allclose(off, np.linalg.norm(expected, axis=1), rtol=1e-6)
+
+
+@pytest.mark.parametrize("at", [-0.7, 0.0, 0.6])
+def test_a_deviation_is_across_the_path_where_it_is_taken(at: float) -> None:
+    """Under the force of that place the tool is neither ahead of it nor short of it."""
+    job = square(2e-3)
+    division = subdivide(job, correct(job), FREE)
+    motion = np.flatnonzero((division.source == 2) & (division.role == Role.ORIGINAL))
+    output = RoundedOutput(job, division, motion)
+    segment = output.place(motion) + (at > 0)
+    away = abs(at) * output.reach[output.place(motion)] / output.extent[segment]
+    share = away if at > 0 else 1.0 - away
+    found = output.deviations(segment, share)
+    wanted, tangent = original(job, found.row, found.share)
+    force = job.force.along(found.row, found.share)
+    command = output.commands(output.blend(segment, share))
+    real = job.simulated(found.row, command, force, share=found.share, corrected=True)
+    shift, _ = job.visible_errors(found.row, real.pose, job.goal(found.row, wanted, found.share))
+    assert np.abs(np.sum(shift * tangent, axis=1)).max() < 2e-8  # [m]
+    np.testing.assert_allclose(found.shift, shift, atol=2e-8)
+
+
+def test_an_exact_point_is_no_rounded_corner() -> None:
+    """It has neither reach nor error; the corner after it has both, of the position and of the orientation."""
+    job = square(2e-3)
+    division = subdivide(job, correct(job), FREE)
+    motion = np.flatnonzero(division.original & np.isin(division.source, [1, 2]))
+    found = np.stack(evaluate_corners(RoundedOutput(job, division, motion), motion))
+    assert found.shape == (3, 2)
+    assert (found[:, 0] == 0).all()
+    assert (found[:, 1] > 0).all()
 
 
 def test_what_is_inserted_keeps_the_shortest_length() -> None:

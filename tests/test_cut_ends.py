@@ -7,6 +7,7 @@ import pytest
 from path_cases import task
 
 from postproc.compensation.corner_fit import fit_corners
+from postproc.compensation.corner_points import PointChooser
 from postproc.compensation.corners import Corners, compare_corners
 from postproc.compensation.correct import correct
 from postproc.compensation.problem import CompensationProblem
@@ -72,3 +73,21 @@ def test_what_is_off_where_a_cut_is_entered_and_left_is_taken_away() -> None:
     assert division.lead_ins.tolist() == [1]
     air = division.command[np.flatnonzero(division.original)[[0, 3]]].position
     assert np.abs(air - job.wanted[np.array([0, 3])].position).max() < 1e-12  # nothing else moves in air
+
+
+@pytest.mark.parametrize(("rounding", "inside"), [(4.5e-3, True), (1e-3, False)])
+def test_what_is_rounded_off_on_less_than_a_motion_gets_its_points_outside(
+    rounding: float, inside: bool
+) -> None:
+    """Where points alone have left more than there was; else they follow the parabola of the original."""
+    job, shortest = one_side(rounding, rounding), 2.5e-3
+    division, corners = run(job, fitted=False)
+    before = corners.difference / job.tolerance
+    limits = Limits(max_growth=100.0, ramp_end=shortest)
+    chooser = PointChooser(job, division, limits, np.ones(4, bool), corners, before)
+    chosen = chooser.choose(100.0 * before)
+    assert chosen.inner.tolist() == [inside, inside]
+    away = np.minimum(chosen.share, 1.0 - chosen.share) * job.desired_path.length[chosen.row]
+    assert len(away) > 1
+    assert (away > shortest - 1e-9).all()
+    assert (away < rounding).any() == inside

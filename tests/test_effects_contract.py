@@ -268,7 +268,7 @@ def jacobian_of(load, values, state, step=1e-5):
     return found, np.abs(found).max() + np.abs(force_of(load, values, state)[0]).max()
 
 
-@pytest.mark.sample(1)
+@pytest.mark.sample(4)
 @arms
 @pytest.mark.parametrize("name", of_kind(EnergyLoad))
 def test_force_is_the_gradient_of_one_energy(name, arm):
@@ -586,6 +586,10 @@ def test_joint_coupling_turns_the_later_wrist_axes():
     turned[:, 4] += 0.01 * q[:, 3]
     turned[:, 5] += -0.02 * q[:, 3] + 0.03 * q[:, 4]
     same(rigid_pose((effect, values), q=q), reference(turned))
+    # of fewer than four joints all are the last three
+    for count, names in ((3, ["r21", "r31", "r32"]), (2, ["r21"]), (1, [])):
+        short = made("joint_coupling", kr270().joints[:count])
+        assert [p.name for p in short.parameters] == names
 
 
 def frame(values):

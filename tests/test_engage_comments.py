@@ -9,7 +9,7 @@ pytest.importorskip("numba")
 from stock_cases import path_through
 from test_engage_command import SLOT, STOCK, TOOLS, call, folder, refused, state
 
-from postproc.process.stock.tool_comments import read_tool_comments
+from postproc.process.stock.tool_comments import read_named_diameters, read_tool_comments
 from postproc.toolpath.toolpath import Annotation
 
 __all__ = ["folder"]
@@ -86,3 +86,50 @@ def test_a_comment_that_is_not_read_leaves_the_tool_missing(folder):
     (folder / "part.ngc").write_text(FLAT16.replace("-5.", "-9.") + SLOT)
     state(folder, STOCK + EDGES)
     refused(folder, "YML003", "tools")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("TC: 10mm Endmill", "10 mm"),
+        ("T1 16 MM FLAT END MILL", "16 mm"),
+        ("TOOL - 1 DIA. OFF. - 1 LEN. - 1 DIA. - 10.", "10"),
+        ('T1 1/2" END MILL', None),
+        ('T1 0.5" END MILL', "0.5 inches"),
+        ("ENDMILL D16 MM", "16 mm"),
+        ("T1 D=10. CR=0. - ZMIN=-7. - flat end mill", "10"),
+        ("ball nose 6 mm", "6 mm"),
+        ("T1 10mm Endmill, 12 mm cutter", None),  # two sizes
+        ("HOLDER DIA 63 MM T1", None),
+        ("STOCK D=120", None),
+        ("END MILL LEAVES 0.5 MM", None),
+        ("POCKET 16 MM END MILL", None),
+        ("FEED 0.1 MM PER TOOTH", None),
+        ("T1", None),
+    ],
+)
+def test_a_diameter_that_a_comment_names(text, words):
+    path = path_through([[0, 0, 5], [0, 0, -5], [50, 0, -5]])
+    named = read_named_diameters(path.with_columns(comments=(Annotation(0, text, 1),)))
+    assert [one.words for one in named.get(1, [])] == ([] if words is None else [words])
+
+
+@pytest.mark.parametrize(
+    ("text", "contradicts"),
+    [
+        ("(16mm Endmill)\n", False),
+        ("(T1 DIA. 0.63)\n", False),  # it may be inches
+        ("(16 mm end mill D=0.63 in)\n", False),  # two sizes: not read
+        ("(T1 10 mm end mill)\n", True),
+        ("(T1 16 in end mill)\n", True),
+        ("(DIA. - 12.)(T1)\n", False),  # names no tool
+        ("(T1 DIA. - 12.)\n", True),
+        ("(T2 10 mm end mill)\n", False),
+    ],
+)
+def test_a_named_diameter_that_differs_is_reported(folder, text, contradicts):
+    (folder / "part.ngc").write_text(text + SLOT)
+    result = json.loads(call(folder, "--json", "-", code=3 if contradicts else 0).stdout)
+    found = [one for one in result["findings"] if one["code"] == "STK019"]
+    assert bool(found) == contradicts
+    assert all("diameter 16 mm, which is used" in one["message"] and one["line"] == 1 for one in found)

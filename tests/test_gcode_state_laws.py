@@ -15,10 +15,10 @@ from postproc.base.findings import CODES
 from postproc.base.geometry import rotation_from_vector
 from postproc.base.units import DEG
 from postproc.languages.gcode import DIALECTS, kuka_cnc, positions
+from postproc.languages.gcode import DIALECTS as GCODE
 from postproc.languages.gcode.code_tables import LINUXCNC
 from postproc.languages.gcode.comments import head
 from postproc.languages.gcode.control import ProgrammedFrame
-from postproc.languages.gcode.detection import CLAIMS
 from postproc.languages.gcode.execution_flow import ExecutionFlow, FlowReason
 from postproc.languages.gcode.lexing import lex
 from postproc.languages.gcode.modal_fill import FilledRows, everywhere, fill_modal, lookup, switched
@@ -571,7 +571,7 @@ KINDS: list[tuple[str, bytes, str]] = [
 
 @pytest.mark.parametrize(("name", "raw", "controls"), KINDS)
 def test_whose_program_it_is(name: str, raw: bytes, controls: str) -> None:
-    found = sorted(control for control, claims in CLAIMS.items() if claims(Path(name), raw))
+    found = sorted(one.name for one in GCODE if one.claims(Path(name), raw))
     assert found == [control for control in controls.split() if not control.endswith("-")]
 
 

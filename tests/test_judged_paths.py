@@ -21,6 +21,7 @@ from judge.motion import DEG, MM, from_abc
 from judge.path import Path as Way
 from judge.reader import read
 from judge.robot import Robot, check_on_mujoco, rotation_vectors, rotations
+from judge.third import third
 
 ROBOT = Path(__file__).parents[1] / "robots" / "kuka_kr270.yaml"
 
@@ -267,21 +268,21 @@ def test_the_written_path(case: Case, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=True, reason="verify 0.0278, judge 0.0263 mm: which of them is right is not settled"
-)
 def test_verify_agrees_where_the_tool_may_be_at_two_places(tmp_path: Path) -> None:
     """The correction turns back at the corner, so that the path is square to the tool before and after it: the nearer
-    of both counts, over all of the stretch on which there are two."""
+    of both counts, over all of the stretch on which there are two.  So does a search by brute force."""
     outcome = run(Case("corners against the force", against_the_force(0.02)), tmp_path, verify=True)
     assert outcome.exit == 3
     assert outcome.verdict is not None
     assert outcome.verify == pytest.approx(outcome.verdict.after.largest / MM, abs=1e-3)
+    program, output = tmp_path / "part.src", tmp_path / "compensated" / "part.src"
+    by_force, _, _ = third(program, output, tmp_path / "cell.yaml")
+    assert outcome.verdict.after.largest == pytest.approx(by_force, abs=2e-7)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("build", "nearest", "most"), [(lead_in(10, 0), 0.020, 0.024), (steps_of_force(), 0.021, 0.024)]
+    ("build", "nearest", "most"), [(lead_in(10, 0), 0.020, 0.028), (steps_of_force(), 0.021, 0.024)]
 )
 def test_what_no_points_hold_is_followed_as_near_as_they_can(
     tmp_path: Path, build: Callable[[Path], Path], nearest: float, most: float

@@ -168,3 +168,15 @@ def test_what_another_module_leaves_is_not_claimed_where_it_has_two_names_for_a_
     assert not read(text, sub=body).toolpath.known[-1]
     apart = text.replace("sub(P.X)", "sub(r)").replace("sub(r,r)", "sub(r,3)")
     assert read(apart, sub=body).toolpath.known[-1]
+
+
+@pytest.mark.parametrize("given", ["r,r", "r,3"])
+def test_what_a_function_may_change_under_another_name_is_not_claimed(given: str) -> None:
+    """In a routine of which it is not known who calls it: ``w`` may be handed over to be changed, and be ``v``."""
+    start = HEAD.replace("DECL FRAME Q\n", "DECL REAL r\n")
+    text = f"{start}r=7\nsub({given})\nLIN {{Y 5}}\nEND\n"
+    body = (
+        "DEF sub(v:OUT,w:OUT)\nREAL v,w\nv=3\nIF grow(w)>0 THEN\nENDIF\nLIN {X v,Y 2,Z 3,A 4,B 5,C 6}\nEND\n"
+        "DEFFCT REAL grow(x:OUT)\nREAL x\nx=9\nRETURN 1\nENDFCT\n"
+    )
+    assert bool(read(text, sub=body).toolpath.known[-1]) is (given == "r,3")

@@ -270,3 +270,38 @@ def test_from_where_a_motion_may_start() -> None:
     last = len(path) - 1
     assert path.predecessors == {last - 3: (last - 4,), last - 2: (last - 4,), last - 1: (last - 3, last - 2)}
     assert path.continues.tolist()[-5:] == [True, False, False, False, True]
+
+
+@pytest.mark.parametrize("word", ["BAS(#BASE,2)\n", "BAS(#TOOL,2)\n"])
+def test_the_same_numbers_in_other_frames_are_no_common_point(word: str) -> None:
+    """What two paths reach in different frames is not inherited, whatever the frames are from there on."""
+
+    def last(first: str, second: str) -> tuple[np.ndarray, str]:
+        point = "LIN {X 7,Y 8,Z 9,A 4,B 5,C 6}\n"
+        path = body(
+            f"IF $IN[1] THEN\n{first}{point}ELSE\n{second}{point}ENDIF\nBAS(#BASE,1)\nBAS(#TOOL,1)\nLIN {{X 100}}\n"
+        ).toolpath
+        return path.position[-1] / MM, path.constraints.refused[len(path) - 1].message
+
+    place, why = last("", "")
+    np.testing.assert_allclose(place, [100.0, 8.0, 9.0])
+    assert "several motions" in why
+    for first, second in ((word, ""), ("", word)):
+        place, why = last(first, second)
+        assert np.isnan(place).all()
+        assert "the position is not known: it varies" in why
+
+
+def test_the_orientation_after_a_run_of_plain_lines_is_that_of_a_last_ptp() -> None:
+    """Under #CONSTANT the LIN before it does not turn the tool to its own angles, and the PTP does."""
+    lines = "".join(f"LIN {{X {x},Y 2,Z 3,A {x},B 5,C 6}}\n" for x in range(10, 30))
+    last = "PTP {X 50,Y 2,Z 3,A 70,B 5,C 6}\n"
+    rest = "$ORI_TYPE=#VAR\nLIN {Y 9}\n"
+    known = body("$ORI_TYPE=#CONSTANT\n" + lines + last + rest)
+    assert codes(known) == []
+    turned = body(lines + last + rest).toolpath
+    np.testing.assert_allclose(known.toolpath.rotation[-1], turned.rotation[-1], atol=1e-12)
+    assert len(codes(body("$ORI_TYPE=#CONSTANT\n" + lines + rest))) == 1
+    line = "LIN {X 60,Y 2,Z 3,A 80,B 5,C 6}\n"
+    assert len(codes(body("$ORI_TYPE=#CONSTANT\n" + lines + last + line + rest))) == 1
+    assert codes(body("$ORI_TYPE=#CONSTANT\n" + lines + last + line.replace("A 80", "A 70") + rest)) == []

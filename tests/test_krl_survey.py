@@ -11,13 +11,13 @@ from test_krl_readings import CASES, FULL, HEAD
 
 from postproc.base.document import Document
 from postproc.base.units import MM
+from postproc.languages.core.motion_sources import FEW, Meeting, Source, together
 from postproc.languages.dialect import Program
 from postproc.languages.krl import KrlDialect, block_flow, motions, open_blocks, program_flow
 from postproc.languages.krl.calls import MOST_CALLS
 from postproc.languages.krl.external_axes import carried_on, reached, stated
 from postproc.languages.krl.lexing import LONGEST, Statement
-from postproc.languages.krl.modal_state import Source
-from postproc.languages.krl.motion_rows import FEW, NAN6, NO_ARC, MotionRow, MotionRows, RowRefusal
+from postproc.languages.krl.motion_rows import NAN6, NO_ARC, MotionRow, MotionRows, RowRefusal
 from postproc.languages.krl.program_blocks import Block, Routine
 from postproc.languages.krl.program_structure import (
     DEEPEST,
@@ -270,13 +270,12 @@ def row(line: int) -> MotionRow:
 
 
 def test_few_places_are_kept_apart_and_many_are_one() -> None:
-    rows = MotionRows(Document(Path("a"), b""))
     few: frozenset[Source] = frozenset(range(FEW))
-    assert rows.joined(few) == few
+    assert together(few) == few
     many: frozenset[Source] = frozenset(range(FEW + 1))
-    marks = [next(iter(rows.joined(frozenset([*many, last])))) for last in (50, 51)]
-    assert marks[0] != marks[1]
-    assert [rows.sources[mark] for mark in marks] == [many | {50}, many | {51}]  # type: ignore[index]
+    meetings = [next(iter(together(frozenset([*many, last])))) for last in (50, 51)]
+    assert meetings[0] != meetings[1]
+    assert [one.sources for one in meetings if isinstance(one, Meeting)] == [many | {50}, many | {51}]
 
 
 def test_rows_are_taken_out_from_any_on() -> None:

@@ -22,6 +22,8 @@ def test_a_corner_reaches_as_far_as_the_cutter():
     assert weight == pytest.approx([0, 0, 0.5, 1, 1, 0.5, 0, 0, 1, 0], abs=0.13)
     wide = turns.at(np.zeros(1, int), np.array([0.5]), np.array([0.06]))
     assert wide == pytest.approx([1.0])
+    sigma = turns.sigma_at(np.zeros(10, int), share, np.full(10, 0.008))
+    assert sigma == pytest.approx([0, 0, 0.5, 0, 0, 0.5, 0, 0, 0, 0], abs=0.2)
 
 
 def test_a_size_that_cannot_be_negative_gains_nothing_from_it():
@@ -56,8 +58,10 @@ def layout_of(rng, count):
     return Layout(rng.uniform(0, 0.3, (count, 3)), normal, np.full(count, 1e-5), free, np.zeros(count, int))
 
 
-def test_the_gain_of_an_effect_is_the_ratio_of_two_normal_densities():
-    """Against scipy's density of the whole covariance, for a shift of either sign."""
+@pytest.mark.parametrize("sigma", [None, 2e-5])
+def test_the_gain_of_an_effect_is_the_ratio_of_two_normal_densities(sigma):
+    """Against scipy's density of the whole covariance, for a shift of either sign, and where it is not sure whether it
+    acts on a point."""
     from scipy.stats import multivariate_normal
 
     from postproc.learning.candidates import FACTORS
@@ -70,13 +74,41 @@ def test_the_gain_of_an_effect_is_the_ratio_of_two_normal_densities():
     rest, causes = 3e-5 * rng.normal(size=count), 2e-5 * rng.normal(size=(count, 3))
     bare = Explanation(layout, SmoothField(1e-5, 0.06, 3e-6), rest, causes, 1e-5 * rng.normal(size=count))
     effect = MissingEffect(
-        "drift", tuple(Cause(a, "effect", CauseKind.SHIFT, 1.0) for a in "xy"), None, columns, False
-    )
+        "drift", tuple(Cause(a, "effect", CauseKind.SHIFT, 1.0) for a in "xy"), None, columns, False,
+        column_sigma=None if sigma is None else sigma * rng.uniform(size=count),
+    )  # fmt: skip
     covariance = layout.covariance(bare.surface, bare.by_force) + causes @ causes.T
     for factor, gain in zip(FACTORS, gains_with(bare, effect, np.arange(count)), strict=True):
         with_it = covariance + factor**2 * columns @ columns.T
+        if effect.column_sigma is not None:
+            with_it = with_it + factor**2 * np.diag(effect.column_sigma**2)
         likely = [multivariate_normal(cov=1e10 * one).logpdf(1e5 * rest) for one in (with_it, covariance)]
         assert gain == pytest.approx(likely[0] - likely[1], abs=1e-6)
+
+
+@pytest.mark.parametrize(("sure", "named"), [(True, False), (False, True)])
+def test_points_where_it_is_not_sure_that_an_effect_acts_do_not_speak_against_it(sure, named):
+    """Four points in corners that agree, and four at their edge where nothing shows: a force in corners."""
+    from postproc.learning.covariance import Explanation, SmoothField
+    from postproc.learning.excluded_points import find_outliers
+    from postproc.learning.naming import NAMED, weigh_effects
+
+    rng = np.random.default_rng(11)
+    count = 60
+    layout = layout_of(rng, count)
+    column, sigma = np.zeros((count, 1)), np.zeros(count)
+    column[:4, 0], column[4:8, 0], sigma[4:8] = 1.5e-4, 0.7e-4, 0.7e-4
+    rest = rng.normal(0, 1e-5, count)
+    rest[:4] += 3e-4
+    whole = Explanation(layout, SmoothField(), rest, np.zeros((count, 0)), np.zeros(count))
+    kept = np.ones(count, bool)
+    kept[find_outliers(whole, 6)] = False
+    assert not kept[:4].any()
+    cause = Cause("corner_force", "effect", CauseKind.FORCE, 0.3)
+    effect = MissingEffect("corner_force", (cause,), None, column, True, column_sigma=None if sure else sigma)
+    best = weigh_effects(whole.part(np.flatnonzero(kept)), whole, [effect], kept)[0]
+    assert (best.gain > NAMED) == named
+    assert best.kept[:4].all() == named
 
 
 def test_outliers_are_those_that_all_others_contradict_whatever_their_order():
@@ -152,3 +184,26 @@ def test_a_worn_gear_shows_in_the_few_points_after_a_reversal(tmp_path):
     learned = postproc.learn(program, program.parent / "m.csv", dry_run=True).attribution
     names = [one.name for one in learned.named] or list(learned.alternatives)
     assert "hysteresis of A1" in names
+
+
+def test_an_outlier_in_a_corner_says_that_a_force_there_would_do_the_same(tmp_path):
+    """One point in a corner and one beside it have 0.4 mm more: two outliers, and one of them may be none."""
+    program = write_shop(tmp_path / "shop")
+    postproc.compensate(program, force=True)
+    first = program.parent / "compensated" / "part.src"
+    rng = np.random.default_rng(3)
+    surface = surface_of(program.parent, *surface_points(140, rng))
+    truth = draw_truth(rng, [name for name in surface.program.operations.names if name != "tool 1"], ())
+    chosen = np.arange(100)
+    deviation = probe(surface, cut(surface, truth, truth.plant(), first, rng), chosen, 1e-5, rng)
+    weight = surface.program.corners.at(surface.row[chosen], surface.share[chosen], np.full(100, 0.008))
+    in_corner, outside = int(np.argmax(weight)), int(np.argmin(weight))
+    assert weight[in_corner] == 1.0
+    assert weight[outside] == 0.0
+    deviation[[in_corner, outside]] += 4e-4
+    write_csv(program.parent / "m.csv", surface, chosen, deviation, first, 1e-5)
+    learned = postproc.learn(program, program.parent / "m.csv", positive="material_left", dry_run=True)
+    outliers = [one for one in learned.findings if one.code == "LRN006"]
+    assert len(outliers) == 2
+    assert ["corner" in one.message for one in outliers].count(True) == 1
+    assert next(one.help for one in outliers if one.help).startswith("measure more points in the corners")

@@ -310,3 +310,14 @@ def test_to_and_fro_at_one_target_is_nothing():
     once = Reversals.of(where, position, shares, np.arange(6) == 0, np.full(3, 0.1))
     assert (once.since.tolist(), once.until.tolist()) == ([2.0], [2.1])
     assert (once.old.tolist(), once.new.tolist()) == ([1.0], [-1.0])
+
+
+def test_with_gaps_a_prediction_starts_from_no_other_state():
+    """The one nearby may lie on the other side of a gap: nothing of it goes into the result."""
+    for job, same in ((lossy(circle()), True), (circle(), False)):
+        rows = np.array([2])
+        case = rows, job.wanted[rows], job.force.along(rows, np.ones(1))
+        alone = job.simulated(*case)
+        beside = job.simulated(*case, start=alone.displacement + 1e-3)
+        assert np.array_equal(alone.pose.position, beside.pose.position) is same
+        np.testing.assert_allclose(beside.pose.position, alone.pose.position, atol=1e-8)

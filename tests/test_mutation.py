@@ -4,10 +4,10 @@ import pytest
 
 pytest.importorskip("cosmic_ray", reason="pip install .[mutation]")
 
-from mutation import judging
-from mutation.command import Judge, changed, row, wilson
-from mutation.covered import Cover, load
+from mutation import judging, stream
+from mutation.command import changed, judge, row, wilson
 from mutation.mutants import mutants, sample
+from mutation.probes import NOTE, with_probes
 
 SOURCE = '''\
 """A document of 3 words."""
@@ -91,35 +91,84 @@ def test_the_interval_is_wilsons():
     assert high == pytest.approx(1.0)
 
 
-def test_lines_that_run_at_import_are_reached_by_all(tmp_path):
-    lines = {"thing.py": {1: [""], 5: ["tests/t.py::one"], 6: ["tests/t.py"], 7: ["tests/u.py::gone"]}}
-    seconds = {
-        "tests/t.py::one": 1.0,
-        "tests/t.py::two": 2.0,
-        "tests/v.py::names": 0.1,
-        "tests/w.py::not": 0.1,
-    }
-    Cover(lines, seconds, {"tests/v.py": ["os", "thing"], "tests/w.py": ["os"]}).save(tmp_path / "kept")
-    kept = load(tmp_path / "kept")
-    assert kept.reaching("thing.py", 5, 5) == ["tests/t.py::one"]
-    assert kept.reaching("thing.py", 5, 6) == ["tests/t.py::one", "tests/t.py::two"]
-    assert kept.reaching("thing.py", 1, 1) == ["tests/t.py::one", "tests/t.py::two", "tests/v.py::names"]
-    assert kept.reaching("thing.py", 7, 9) == []
+def test_a_probe_is_before_the_statement_of_its_mutant(tree):
+    """A mutant that runs at import is reached by whoever calls a function of the file."""
+    numbered = dict(enumerate(mutants(tree, "thing.py")))
+    lines = {mutant.line for mutant in numbered.values()}
+    run: dict[str, object] = {NOTE: lambda *numbers: reached.update(numbers)}
+    exec(compile(with_probes(SOURCE, numbered), "thing.py", "exec", dont_inherit=True), run)
+    reached: set[int] = set()
+    assert run["grown"](None) == -1.0
+    assert {numbered[number].line for number in reached} == lines - {17}
+    assert run["grown"].__doc__ == "Adds 7 to nothing."
+    assert run["grown"](run["Thing"](3), 2.0) == 5.0
+    assert {numbered[number].line for number in reached} == lines
+
+
+CACHED = """\
+import functools
+import pytest
+from thing import Thing, grown
+
+@functools.cache
+def three():
+    return grown(Thing(3), 0.5)
+
+@pytest.fixture(scope="module")
+def five():
+    return grown(Thing(3), 2.0)
+
+def test_fixture(five):
+    assert five == 5.0
+
+def test_cached():
+    assert three() == 3.5
+
+def test_none():
+    assert grown(None) < 0
+"""
+
+
+@pytest.mark.slow
+def test_one_run_finds_what_falls_to_which_test(tree, tmp_path):
+    """Mutants behind fixtures of a file and cached results too; what runs at import is left over, with its tests."""
+    (tree / "tests" / "test_thing.py").write_text(CACHED)
+    judging.warm(judging.FAST)
+    chosen = [(one, text) for one in mutants(tree, "thing.py") if (text := one.text(SOURCE)) is not None]
+    log = tmp_path / "stream.jsonl"
+    seen = stream.run(tree, chosen, ["tests/test_thing.py"], log, 30.0, judging.FAST)
+    fixture, cached, none = (f"tests/test_thing.py::test_{word}" for word in ("fixture", "cached", "none"))
+    assert list(seen.seconds) == [fixture, cached, none]
+    verdicts, by_line = {}, {16: [none], 17: [fixture, cached]}
+    for number, (mutant, text) in enumerate(chosen):
+        after = changed(SOURCE, text)[1].replace(" ", "")
+        verdicts[after] = seen.verdicts.get(number)
+        assert seen.reached[number] == by_line.get(mutant.line, [fixture, cached, none])
+    assert verdicts["returnthing.size-by*len(list(pairs))"] in (("killed", fixture), ("killed", cached))
+    assert verdicts["ifthingisnotNoneornotby>0:"][0] == "killed"
+    assert verdicts["ifthingisNoneornotby>1:"] == ("killed", cached)
+    assert verdicts["return+1.0"] == ("killed", none)
+    assert verdicts["return-2.0"] == ("survived", "")
+    assert verdicts["size:int|None=3"] is None
+    left = log.read_text()
+    assert stream.run(tree, chosen, ["tests/test_thing.py"], log, 30.0, judging.FAST) == seen
+    assert log.read_text() == left
 
 
 @pytest.mark.slow
 def test_mutants_fall_by_the_tests_that_reach_them(tree, tmp_path):
     """And the tree is afterwards what it was, with nothing left of them."""
-    quick, slow, far = (f"tests/test_thing.py::test_{word}" for word in ("quick", "slow", "far"))
-    lines = {"thing.py": {14: [quick, slow], 15: [quick, slow], 16: [quick], 17: [slow]}}
-    cover = Cover(lines, {quick: 0.01, slow: 0.02, far: 0.01}, {})
+    quick, slow = (f"tests/test_thing.py::test_{word}" for word in ("quick", "slow"))
+    reached = {15: [quick, slow], 16: [quick], 17: [slow]}
     stat = (tree / "thing.py").stat()
-    judge = Judge(tmp_path, tree, cover, 10.0)
     verdicts = {}
     for mutant in mutants(tree, "thing.py"):
         text = mutant.text(SOURCE)
-        if text is not None and mutant.line in (15, 16, 17):
-            verdicts[changed(SOURCE, text)[1].replace(" ", "")] = judge.judge(mutant, text)
+        if text is not None and mutant.line in reached:
+            after = changed(SOURCE, text)[1].replace(" ", "")
+            tests = dict.fromkeys(reached[mutant.line], 0.01)
+            verdicts[after] = judge(tmp_path, tree, mutant, text, tests, judging.ALL)
+    assert judge(tmp_path, tree, mutant, SOURCE, {}, judging.ALL) == ("not reached", "")
     assert verdicts["returnthing.size-by*len(list(pairs))"] == ("killed", slow)
     assert verdicts["return-2.0"] == ("survived", "")
     assert verdicts["return+1.0"] == ("killed", quick)
@@ -127,6 +176,16 @@ def test_mutants_fall_by_the_tests_that_reach_them(tree, tmp_path):
     assert (tree / "thing.py").read_text() == SOURCE
     assert (tree / "thing.py").stat().st_mtime_ns == stat.st_mtime_ns
     assert not list((tree / "__pycache__").glob("thing*")) if (tree / "__pycache__").exists() else True
+
+
+def test_quick_tests_and_those_that_killed_come_first():
+    seen = stream.Stream(seconds={"a": 1.0, "b": 0.5, "c": 9.0, "d": 2.0}, reached={0: ["a", "b", "c", "d"]})
+    assert list(seen.choice(0, 4.0)) == ["b", "a", "d"]
+    assert list(seen.choice(1, 4.0)) == []
+    for number in (5, 6):
+        seen.add({"mutant": number, "verdict": "killed", "test": "a"})
+    assert list(seen.choice(0, 1.2)) == ["a"]
+    assert list(seen.choice(0, 0.1)) == ["a"]
 
 
 def test_what_hangs_is_a_timeout(tree, tmp_path, monkeypatch):

@@ -222,6 +222,49 @@ def test_a_browser_shows_part_robot_and_force(window, page, wide, scheme):
     assert not [said for said in shown.complaints if "GPU stall" not in said]
 
 
+MOVING = """() => {
+  const canvas = document.getElementById('part'), view = canvas.view, gl = view.gl;
+  const bytes = Uint8Array.from(atob(view.data.errors), (letter) => letter.charCodeAt(0));
+  const errors = new Int16Array(bytes.buffer), largest = (side, chosen) => {
+    let most = 0;
+    for (const i of chosen) { const e = errors[2 * i + side]; if (e > -32767) most = Math.max(most, Math.abs(e)); }
+    return most;
+  };
+  const all = [...Array(errors.length / 2).keys()], sides = [];
+  for (let side = 0; side < view.data.sides; side++) {
+    const few = view.coarser(side), corners = new Uint32Array(few.count);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, few.buffer);
+    gl.getBufferSubData(gl.ELEMENT_ARRAY_BUFFER, 0, corners);
+    sides.push([few.count, view.faces.count, largest(side, corners), largest(side, all)]);
+  }
+  const still = canvas.width;
+  view.moving = true;
+  const levels = [0, 20, 70, 90, 140, 190, 240, 290, 340].map((now) => { view.watch(now); return view.level; });
+  view.paint();
+  const moving = canvas.width;
+  view.moving = false;
+  view.watch(400);
+  view.paint();
+  return { sides, levels, widths: [still, moving, canvas.width], shown: canvas.dataset.level };
+}"""
+
+
+@pytest.mark.slow
+def test_a_view_that_moves_slowly_has_less_detail_until_it_rests(window, page):
+    shown = window(page[0], viewport={"width": 900, "height": 700}, device_scale_factor=1)
+    if shown.page.eval_on_selector("#part-live", "e => e.hidden"):
+        pytest.skip("this Chromium has no WebGL 2")
+    found = shown.page.evaluate(MOVING)
+    for few, every, largest, of_all in found["sides"]:
+        assert 3_000 < few < 0.2 * every
+        assert largest == of_all  # the worst place is still there
+    # two slow frames in a row take a level each time, one alone does not
+    assert found["levels"] == [0, 0, 0, 0, 0, 1, 1, 2, 2]
+    still, moving, after = found["widths"]
+    assert (moving, after) == (round(still / 2), still)
+    assert found["shown"] == "0"
+
+
 @pytest.mark.slow
 def test_playing_along_the_path(window, page):
     shown = window(page[0], viewport={"width": 900, "height": 700})

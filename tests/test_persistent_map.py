@@ -31,3 +31,19 @@ def test_versions_and_their_merge(shared: list, one: list, other: list) -> None:
     }
     assert left.merged(left, lambda *_: -1) is left
     assert merged.merged(right, lambda key, a, b: a) is merged
+
+
+def test_what_is_common_to_two_maps() -> None:
+    """Of many keys, some with equal values, some in one map alone; the same object where nothing goes."""
+    numbers = KeyNumbers()
+    one = other = PersistentMap(numbers)
+    for key in range(300):
+        one = one.set(key, float(key))
+        if key % 3:
+            other = other.set(key, float(key) if key % 2 else -1.0)
+    for key in range(1000, 1300):
+        other = other.set(key, 1.0)
+    assert dict(one.common(other).items()) == {key: float(key) for key in range(300) if key % 3 and key % 2}
+    assert dict(other.common(one).items()) == dict(one.common(other).items())
+    assert one.common(one) is one
+    assert (few := PersistentMap(numbers).set(1, 1.0)).common(other) is few

@@ -13,8 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from conftest import CELL
+from test_gcode_read import body
 
 from postproc.base import rotary_words
+from postproc.compensation.orientations import shares_between, shortest
 from postproc.languages.gcode.orientation_words import Angles
 
 WORD = re.compile(r"([A-Z])(?:\d?=)?([-+]?\d*\.?\d+)")
@@ -447,3 +449,19 @@ def test_the_outer_axis_moves_continuously_over_the_pole():
     assert outer[0] == pytest.approx(-0.05 / np.sin(np.radians(6)), rel=0.01)
     assert abs(outer[len(lean) // 2]) < 0.01
     assert np.abs(outer).max() == pytest.approx(3.0, abs=0.01)
+
+
+@pytest.mark.parametrize(("first", "last"), [(0.5, 12.0), (3.0, 30.0), (-4.0, 9.0), (20.0, 2.0), (5.0, 5.0)])
+def test_the_shortest_of_many_segments_is_known(first, last):
+    """They are even in u = asinh(lean / POLE); the shortest lies where the axes are nearest to their pole."""
+    text = f"G43.4 H1\nG1 X0. Y0. Z0. B{first} C0. F1000\nG1 X100. B{last} C40.\n"
+    path = body(text, "fanuc").toolpath
+    row = np.array([len(path) - 1])
+    low, high = np.zeros(1), np.ones(1)
+    count = 20000
+    part = np.linspace(0.0, 1.0, count + 1)
+    many = np.repeat(row, count + 1)
+    shares = shares_between(path, many, 0.0 * part, 0.0 * part + 1.0, part)
+    smallest = float(np.diff(shares).min()) * count
+    assert shortest(path, row, low, high)[0] == pytest.approx(min(1.0, smallest), rel=2e-3)
+    assert (smallest < 0.99) == (first != last)

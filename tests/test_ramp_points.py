@@ -16,7 +16,7 @@ from postproc.compensation.closest_points import closest_points
 from postproc.compensation.corner_fit import fit_corners
 from postproc.compensation.corners import rounded_errors
 from postproc.compensation.correct import correct
-from postproc.compensation.point_fit import Curves, fit_points
+from postproc.compensation.point_fit import Curves, evaluate_polygons, fit_points, moved_apart
 from postproc.compensation.ramp_points import NEVER, choose_ramp_points
 from postproc.compensation.rounded_path import RoundedOutput
 from postproc.compensation.subdivide import subdivide
@@ -121,6 +121,16 @@ def test_points_that_start_too_near_to_each_other_are_moved_apart() -> None:
     assert largest < 0.5 * alone
 
 
+def test_points_that_coincide_are_moved_by_their_neighbours_alone() -> None:
+    """Nothing says into which direction they could leave each other."""
+    x = np.array([0.0, 1.0, 1.0, 1.1, 5.0]) * MM
+    points = np.stack([x, 0.0 * x, 0.0 * x], axis=1)[None]
+    moved = moved_apart(points, np.full((1, 4), 0.3 * MM))
+    assert np.isfinite(moved).all()
+    assert np.abs(np.diff(moved[0, :, 0])).min() > 0.299 * MM
+    np.testing.assert_array_equal(moved[0, [0, -1]], points[0, [0, -1]])
+
+
 def arc_and_line(is_arc: bool) -> Curves:
     """Round a circle of 10 mm until (0, 0), along x from there on; over the last 0.3 mm before it and the first after
     it on the parabola of the controller."""
@@ -163,6 +173,17 @@ def test_points_on_an_arc_follow_it() -> None:
             assert np.abs(points - start).max() < 0.2 * MM
     assert found[0] < 5e-6
     assert found[1] > 50e-6
+
+
+@pytest.mark.parametrize("off", [0.4 * MM, -0.4 * MM])
+def test_every_point_has_the_parameter_of_the_nearest_place(off: float) -> None:
+    """Of an arc, wherever it was looked for; the vertex has its own."""
+    curves = arc_and_line(True)
+    parameter = np.array([[-12.0, -9.0, -5.0, -3.0, 0.0, 4.0, 8.0, 30.0]]) * MM
+    points, vertex = curves.at(parameter)[0], 4
+    start = parameter + off * np.array([0.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 0.0])
+    found = evaluate_polygons(curves, points, np.zeros(parameter.shape), None, start, vertex)
+    np.testing.assert_allclose(found.label, parameter, atol=1e-6)
 
 
 @pytest.mark.slow

@@ -9,11 +9,11 @@ import pytest
 
 from postproc.base.document import Document
 from postproc.languages import DIALECTS
+from postproc.languages.core.flow_runner import FlowRunner
 from postproc.languages.dialect import Program, ReadingSettings
-from postproc.languages.rapid.flow_graph import FlowGraph
 from postproc.languages.rapid.parsing import ModuleParser
 from postproc.languages.rapid.program_state import ProgramState
-from postproc.languages.rapid.routine_runner import RoutineRunner
+from postproc.languages.rapid.routine_graph import RoutineGraph
 
 EXTRA = "[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]"
 HEAD = f"""MODULE part
@@ -158,18 +158,18 @@ def test_nothing_is_inserted_before_a_comment_that_several_others_may_precede() 
 def test_a_long_block_is_not_run_again_with_the_same_state() -> None:
     within = "n:=n+1;\n" * 20
     text = f"{HEAD}PROC main()\nWHILE di1=1 DO\nFOR i FROM 1 TO n DO\n{within}ENDFOR\nENDWHILE\nENDPROC\nENDMODULE\n"
-    graph = FlowGraph(ModuleParser(text.encode()).file().routines[0].body)
+    graph = RoutineGraph(ModuleParser(text.encode()).file().routines[0].body)
     ran: list[int] = []
     version = 0
 
-    def after(_: FlowGraph, at: int, state: ProgramState) -> list[tuple[int, ProgramState]]:
+    def after(_: RoutineGraph, at: int, state: ProgramState) -> list[tuple[int, ProgramState]]:
         block = graph.blocks[at]
         ran.append(len(block.steps))
         return [
             (to, state) for to in ((block.follow, block.otherwise) if block.condition else (block.follow,))
         ]
 
-    runner = RoutineRunner(after, lambda: version)
+    runner = FlowRunner(after, lambda: version)
     for count in (1, 1, 2, 3):
         version = int(count == 2)
         runner.start()

@@ -14,7 +14,7 @@ from test_mirror import task as joints_task
 
 from postproc.base.geometry import Poses, arc_through, rotation_from_vector
 from postproc.compensation.correct import correct
-from postproc.compensation.divisible_motions import ROOM
+from postproc.compensation.divisible_motions import ROOM, DivisibleMotions
 from postproc.compensation.mirror import pose_error
 from postproc.compensation.path_error import path_errors
 from postproc.compensation.problem import CompensationProblem
@@ -601,3 +601,18 @@ def test_behind_another_tool_a_motion_begins_with_its_own():
     there = division.command[[1]] @ tool[1].inverse() @ longer
     np.testing.assert_allclose(begin.position, there.position, atol=1e-12)
     np.testing.assert_allclose(begin.rotation, there.rotation, atol=1e-12)
+
+
+def test_an_arc_is_rounded_off_only_where_points_are_inserted():
+    """The controller rounds off what is inserted into it; its exact ends it does not."""
+    found = []
+    for reach in (np.nan, 0.5):
+        constraints = EditConstraints(inserted_approximation=np.full(4, reach))
+        job = circle(approximation=np.zeros(4), constraints=constraints)
+        motions = DivisibleMotions(job, correct(job), Limits(max_growth=100.0))
+        chosen = np.arange(len(motions.owner))
+        assert len(chosen) == 1
+        found.append([motions.largest_errors(chosen, np.full(len(chosen), count))[0] for count in (1, 4)])
+    (alone, divided), (exact, rounded) = found
+    assert exact == alone
+    assert rounded > divided + 1.0

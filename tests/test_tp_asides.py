@@ -56,3 +56,23 @@ def test_the_motion_before_an_increment_stays() -> None:
     assert list(path.constraints.locked) == [1]
     assert "INC" in path.constraints.locked[1].message
     assert not read("L P[1] 9mm/sec FINE", "L P[2] 9mm/sec FINE Offset,PR[1]").constraints.locked
+
+
+@pytest.mark.parametrize(
+    ("first", "more", "limit", "known"),
+    [("1", "R[1]+2", "3", (0,)), ("0.1", "R[1]+0.2", "0.3", (0, 1)), ("0.5", "R[1]*0.2", "0.1", (0, 1))],
+)
+def test_a_comparison_that_rounding_decides_is_not_decided(
+    first: str, more: str, limit: str, known: tuple[int, ...]
+) -> None:
+    """0.1 + 0.2 is 0.3 or beside it, as the controller rounds: with the digits computed here it never jumps."""
+    path = read(
+        f"R[1]={first}",
+        f"R[2]={more}",
+        "L P[1] 9mm/sec FINE",
+        f"IF R[2]={limit},JMP LBL[1]",
+        "L P[2] 9mm/sec FINE",
+        "LBL[1]",
+        "L P[3] 9mm/sec FINE",
+    )
+    assert path.predecessors.get(2, (1,)) == known

@@ -1,11 +1,12 @@
 """Faults planted in written programs: ``verify`` rejects every one of them (see ``planted_faults``)."""
 
 import pytest
-from judge.cases import CASES, FIVE_AXIS, gcode
+from judge.cases import CASES, FIVE_AXIS, gcode, straight
 from judge.drawn import drawn
 from judge.further_cases import FURTHER
 from planted_faults import SAMPLES, Written
 
+from postproc.base.findings import Refusal
 from postproc.workflows.preparation import Request
 from postproc.workflows.program import compensate
 from postproc.workflows.verify import verify
@@ -120,3 +121,45 @@ def test_an_original_that_has_no_figure_is_no_fault_of_what_was_written(tmp_path
     again = verify(Request(program, force=""), program)
     assert "VER007" in {one.code for one in again.findings}
     assert again.exit == 3
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (" C_DIS", " C_VEL"),
+        ("$APO.CDIS=0.5", "$APO.CDIS=0.6"),
+        ("$APO.CDIS=0.5", "$APO.CDIS=0.5\n$APO.CVEL=50"),
+    ],
+)
+def test_another_approximation_is_rejected(old, new, tmp_path):
+    """However little it moves the path, and where nobody knows by how much."""
+    program = CORNERS["corners, C_DIS 0.5"].build(tmp_path)
+    compensate(Request(program, force=""))
+    output = tmp_path / "compensated" / program.name
+    assert verify(Request(program, force=""), output).exit == 0
+    text = output.read_text()
+    assert old in text
+    output.write_text(text.replace(old, new, 1))
+    done = verify(Request(program, force=""), output)
+    assert done.exit != 0
+    assert any(one.code == "VER005" and "another approximation" in one.message for one in done.findings)
+
+
+@pytest.mark.parametrize("name", ["hysteresis", "backlash"])
+def test_lost_motion_puts_no_points_into_air(name, tmp_path):
+    """The long way from the home position turns axes round; nothing is cut on it."""
+    program = straight(name, {"hysteresis": "w1", "backlash": "b1"}[name])(tmp_path)
+    assert compensate(Request(program, force="")).exit == 0
+    done = verify(Request(program, force=""), tmp_path / "compensated" / program.name)
+    assert (done.exit, [one for one in done.findings if one.severity != "info"]) == (0, [])
+
+
+def test_a_feed_that_no_machine_has_is_refused(tmp_path):
+    program = CORNERS["corners, C_DIS 0.5"].build(tmp_path)
+    text = program.read_text()
+    assert "$VEL.CP=0.05" in text
+    program.write_text(text.replace("$VEL.CP=0.05", "$VEL.CP=1000000000"))
+    with pytest.raises(Refusal) as refused:
+        compensate(Request(program, force=""))
+    assert [one.code for one in refused.value.findings] == ["FIL015"]
+    assert not (tmp_path / "compensated").exists()

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from postproc.base.paged_memory import release_pages
 from postproc.base.read_files import MAX_LINE
 
-PIECE = 16 << 20
+CHUNK = 16 << 20
 """Bytes that are looked through at a time."""
 
 
@@ -17,7 +17,7 @@ def occurrences(pattern: re.Pattern[bytes], raw: bytes) -> Iterator[int]:
     line may be."""
     at = 0
     while at < len(raw):
-        after = stop = at + PIECE
+        after = stop = at + CHUNK
         for found in pattern.finditer(raw, at, stop + MAX_LINE):
             if found.start() >= stop:
                 break
@@ -34,8 +34,8 @@ def occurs(pattern: re.Pattern[bytes], raw: bytes) -> bool:
 
 def find_word(raw: bytes, word: bytes, start: int = 0) -> int:
     """``raw.find(word, start)``"""
-    for at in range(start, len(raw), PIECE):
-        found = raw.find(word, at, at + PIECE + len(word) - 1)
+    for at in range(start, len(raw), CHUNK):
+        found = raw.find(word, at, at + CHUNK + len(word) - 1)
         if found >= 0:
             return found
         release_pages()

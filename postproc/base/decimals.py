@@ -48,6 +48,18 @@ def literals(
     return value, decimals
 
 
+def decimals_of(literal: bytes) -> int:
+    """The decimals that a literal is written with, its exponent considered."""
+    mantissa, _, exponent = literal.upper().partition(b"E")
+    written = len(mantissa.partition(b".")[2].strip())
+    return min(max(written - int(exponent or b"0"), 0), MOST_DECIMALS)
+
+
+def other_literal(literal: bytes) -> tuple[float, int]:
+    """Value and decimals of a literal in any form that ``float`` reads."""
+    return float(literal), decimals_of(literal)
+
+
 def plain_decimals(
     raw: NDArray[np.uint8], start: NDArray[Any], stop: NDArray[Any], point: bytes = b"."
 ) -> tuple[Floats, Ints, Bools]:

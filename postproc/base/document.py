@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from postproc.base.array_storage import ArrayStore
 from postproc.base.arrays import Ints, sums
+from postproc.base.batches import in_blocks
 from postproc.base.sized_bytes import SizedBytes
 
 Offsets = NDArray[np.signedinteger]
@@ -279,16 +280,21 @@ def apply(document: Document, edits: Iterable[Edit]) -> bytes:
         all_edits.stop.sum(dtype=np.int64) - all_edits.start.sum(dtype=np.int64)
     )
     written, at = SizedBytes(len(raw) + growth), 0
-    for low, high in _blocks(all_edits):
+    old, texts = np.frombuffer(raw, np.uint8), np.frombuffer(all_edits.texts, np.uint8)
+    parts = list(_blocks(all_edits))
+
+    def spliced(part: slice) -> NDArray[np.uint8]:
+        low, high = parts[part.start]
         block_start, block_end = int(all_edits.start[low]), int(all_edits.stop[high - 1])
-        written.write(memoryview(raw)[at:block_start])
-        texts = np.frombuffer(all_edits.texts, np.uint8)[all_edits.ends[low] : all_edits.ends[high]]
         lengths = np.diff(all_edits.ends[low : high + 1])
         start, stop = all_edits.start[low:high] - block_start, all_edits.stop[low:high] - block_start
-        written.write(
-            _spliced(np.frombuffer(raw, np.uint8)[block_start:block_end], start, stop, texts, lengths).data
-        )
-        at = block_end
+        own = texts[all_edits.ends[low] : all_edits.ends[high]]
+        return _spliced(old[block_start:block_end], start, stop, own, lengths)
+
+    for (low, high), new in zip(parts, in_blocks(spliced, len(parts), 1), strict=True):
+        written.write(memoryview(raw)[at : int(all_edits.start[low])])
+        written.write(new.data)
+        at = int(all_edits.stop[high - 1])
     written.write(memoryview(raw)[at:])
     return written.done()
 
@@ -349,15 +355,22 @@ def undone(written: bytes, original: bytes, edits: Iterable[Edit]) -> bool:
     if _disorder(all_edits, len(original)) >= 0:
         return False
     new, old, texts = (np.frombuffer(part, np.uint8) for part in (written, original, all_edits.texts))
-    at = here = 0  # how far the original, and the written bytes, were compared
-    for low, high in _blocks(all_edits):
+    parts, shifts = list(_blocks(all_edits)), [0]
+    """How far after its place in the original the first edit of each part lies, and what follows the last one."""
+    for low, high in parts:
+        removed = all_edits.stop[low:high].sum(dtype=np.int64) - all_edits.start[low:high].sum(dtype=np.int64)
+        shifts.append(shifts[-1] + int(all_edits.ends[high]) - int(all_edits.ends[low]) - int(removed))
+
+    def undoes(part: slice) -> bool:
+        low, high = parts[part.start]
+        at = int(all_edits.stop[low - 1]) if low else 0  # how far those before compare the original
         start, stop = all_edits.start[low:high].astype(np.int64), all_edits.stop[low:high].astype(np.int64)
-        block_start, block_end = int(start[0]), int(stop[-1])
-        if not np.array_equal(new[here : here + block_start - at], old[at:block_start]):
+        before, block_start, block_end = shifts[part.start], int(start[0]), int(stop[-1])
+        if not np.array_equal(new[at + before : block_start + before], old[at:block_start]):
             return False
         lengths = np.diff(all_edits.ends[low : high + 1])
         # How far after its place in the original each edit, and what follows it, lies.
-        shift = here - at + sums(lengths - (stop - start))
+        shift = before + sums(lengths - (stop - start))
         if block_end + int(shift[-1]) > len(written):
             return False
         between = _offsets(stop[:-1], start[1:] - stop[:-1])
@@ -365,7 +378,8 @@ def undone(written: bytes, original: bytes, edits: Iterable[Edit]) -> bool:
         if not np.array_equal(new[between + moves], old[between]):
             return False
         text_offsets = _offsets(start + shift[:-1], lengths)
-        if not np.array_equal(new[text_offsets], texts[all_edits.ends[low] : all_edits.ends[high]]):
-            return False
-        at, here = block_end, block_end + int(shift[-1])
-    return np.array_equal(new[here:], old[at:])
+        return np.array_equal(new[text_offsets], texts[all_edits.ends[low] : all_edits.ends[high]])
+
+    at = int(all_edits.stop[-1]) if len(all_edits) else 0
+    rest = np.array_equal(new[at + shifts[-1] :], old[at:])
+    return rest and all(in_blocks(undoes, len(parts), 1))

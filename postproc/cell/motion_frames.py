@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -26,13 +27,15 @@ class MotionFrames:
 
     base_in_robot (N): programmed base in the robot root; tool_in_flange (N): TCP; spindle_in_tool (N, 3): unit
     vector of the spindle, tip-ward, in tool axes.  NaN where unknown.  Read-only.  external: what external axes move;
-    where they do, the robot root is that for all of them at zero, turning with the part.
+    where they do, the robot root is that for all of them at zero, turning with the part.  diameters: of the cutters of
+    the cell's tools by their numbers [m], where stated.
     """
 
     base_in_robot: Poses
     tool_in_flange: Poses
     spindle_in_tool: Floats
     external: External | None = None
+    diameters: Mapping[int, float] = field(default_factory=dict)
 
 
 def frames_of(
@@ -65,6 +68,7 @@ def frames_of(
         _per_row(tool_in_flange, toolpath.tool),
         _rows(np.array([*axes, np.full(3, np.nan)]), toolpath.tool),
         external,
+        {number: tool.diameter for number, tool in cell.tools.items() if tool.diameter is not None},
     )
 
 

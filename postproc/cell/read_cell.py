@@ -29,6 +29,11 @@ NAME = "cell.yaml"
 
 SAME_PLACE = 1.0 * MM
 """Touch points that are nearer to each other than this do not determine a direction."""
+LARGEST_LENGTH, LARGEST_ANGLE, LARGEST_PLACE = 500.0, 45.0, 1e5
+"""[mm], [deg] The largest numbers of the path that a cell can mean (a ramp is as long as the largest tool's radius),
+and the farthest touch point."""
+MOST_GROWTH, LARGEST_FORCE = 1e6, 1e6
+"""The same of ``max_growth``, and of a component of the force [N]."""
 ON_A_LINE = 0.01
 """Touch points lie on a line where their extent across it is less than this share of that along it."""
 
@@ -142,11 +147,11 @@ def load_cell(path: Path) -> Cell:
         start_stated=_start(top),
         start_line=top.line_of("start") if "start" in top else 0,
         orientation=_orientation(top),
-        tolerance=_positive(top, "tolerance", 0.02, "mm") * MM,
-        tolerance_angle=_positive(top, "tolerance_deg", 0.01, "deg") * DEG,
-        max_correction=_positive(top, "max_correction", 10.0, "mm") * MM,
-        min_segment=_positive(top, "min_segment", 1.0, "mm") * MM,
-        max_growth=top.number("max_growth", 2.0, low=1.0),
+        tolerance=_positive(top, "tolerance", 0.02, "mm", LARGEST_LENGTH) * MM,
+        tolerance_angle=_positive(top, "tolerance_deg", 0.01, "deg", LARGEST_ANGLE) * DEG,
+        max_correction=_positive(top, "max_correction", 10.0, "mm", LARGEST_LENGTH) * MM,
+        min_segment=_positive(top, "min_segment", 1.0, "mm", LARGEST_LENGTH) * MM,
+        max_growth=top.number("max_growth", 2.0, low=1.0, high=MOST_GROWTH),
         growth_stated="max_growth" in top,
         segment_stated="min_segment" in top,
         controller=Controller(
@@ -167,7 +172,7 @@ def load_cell(path: Path) -> Cell:
         force_factors=_force_factors(top),
         tool_errors={number: read_tool_error(section) for number, section in _numbered(top, "tool_errors")},
         tool_errors_line=top.line_of("tool_errors") if "tool_errors" in top else 0,
-        force_ramp=top.number("force_ramp", low=0.0, unit="mm") * MM if "force_ramp" in top else None,
+        force_ramp=_ramp(top),
         touch_points=_touch_points(top, correct),
         touch_line=top.line_of("touch_points") if "touch_points" in top else 0,
         temperature=(
@@ -199,8 +204,15 @@ def _force(top: YamlSection) -> str | None:
     return _word(top, "force")
 
 
-def _positive(section: YamlSection, key: str, default: float, unit: str) -> float:
-    value = section.number(key, default, unit=unit)
+def _ramp(top: YamlSection) -> float | None:
+    """[m] the stated path over which a force changes."""
+    if "force_ramp" not in top:
+        return None
+    return top.number("force_ramp", low=0.0, high=LARGEST_LENGTH, unit="mm") * MM
+
+
+def _positive(section: YamlSection, key: str, default: float, unit: str, most: float) -> float:
+    value = section.number(key, default, high=most, unit=unit)
     if value <= 0:
         raise section.error("YML004", f"{value:g} is not above 0", key, f"write a number in {unit}, above 0")
     return value
@@ -295,7 +307,8 @@ def _force_interval(top: YamlSection) -> tuple[float | None, ForceVectorInterval
     direction = section.number("direction_deg", 0.0, low=0.0, high=90.0, unit="deg") * DEG
     components = None
     if stated:
-        components = frozen([section.number(name, low=0.0, unit="N") for name in names], (3,))
+        bounds = {"low": 0.0, "high": LARGEST_FORCE}
+        components = frozen([section.number(name, **bounds, unit="N") for name in names], (3,))
     return scale, ForceVectorInterval(direction, components)
 
 
@@ -328,6 +341,10 @@ def _touch_points(top: YamlSection, correct: str) -> dict[int | None, Floats]:
 def _places(section: YamlSection, key: str) -> Floats:
     """(K, 3) [m] touch points that lie apart and, three and more of them, not on a line."""
     points = np.array(section.rows(key, 3, unit="mm")) * MM
+    if np.abs(points).max() > LARGEST_PLACE * MM:
+        far = float(np.abs(points).max()) / MM
+        message = f"{far:g} mm is not within {-LARGEST_PLACE:g} .. {LARGEST_PLACE:g}"
+        raise section.error("YML004", message, key, "write places in the base, in mm")
     apart = np.linalg.norm(points[:, None] - points[None], axis=2) + np.diag(np.full(len(points), np.inf))
     if apart.min() < SAME_PLACE:
         one, other = np.unravel_index(int(np.argmin(apart)), apart.shape)

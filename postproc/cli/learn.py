@@ -73,7 +73,7 @@ from postproc.learning.deviation_signs import SIGNS
     "plan_points",
     type=click.IntRange(6, 500),
     metavar="N",
-    help="Choose the N most telling points of one file, in which DEV may be missing, and write them to --csv"
+    help="Choose the N most informative points of one file, in which DEV may be missing, and write them to --csv"
     " [<stem>.measure.csv beside the file].",
 )
 @click.option("--dry-run", is_flag=True, help="Report only, write nothing.")

@@ -11,7 +11,11 @@ import click
 
 from postproc import __version__
 from postproc.base.findings import nearest
-from postproc.base.memory import use_mmap_for_large_arrays
+from postproc.base.memory import (
+    collect_late,
+    leave_objects_to_the_system,
+    use_mmap_for_large_arrays,
+)
 from postproc.cli.completion import Commands
 from postproc.cli.signals import ended_in_words
 from postproc.cli.streams import guarded_streams
@@ -80,10 +84,21 @@ def run(argv: Sequence[str] | None = None) -> None:
     # the matrices here are small: threads for them cost more than they give, and runs beside each other fight
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     use_mmap_for_large_arrays()
+    if argv is None:
+        collect_late()
+    try:
+        _guarded(words, and_exits=argv is None)
+    finally:
+        if argv is None:
+            leave_objects_to_the_system()
+
+
+def _guarded(words: list[str], and_exits: bool) -> None:
+    """``_run`` with streams that may fail."""
     before = publications()
     with guarded_streams() as out:
         try:
-            _run(words, and_exits=argv is None)
+            _run(words, and_exits)
         except SystemExit as end:
             out.flush()
             if not out.problem or end.code not in (None, 0, 3):

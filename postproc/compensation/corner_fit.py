@@ -293,10 +293,8 @@ def _largest(task: CompensationProblem, fitted: CornerDivision, accepted: Bools)
     points = fitted.motion[accepted[fitted.group]]
     beside = np.union1d(points, points + 1)
     for part in blocks(len(largest), BLOCK):
-        first, last = fitted.group_start[part.start], fitted.group_start[part.stop]
-        motions = fitted.motion[first:last]
-        output = RoundedOutput(task, fitted.division, np.unique(np.concatenate([motions, motions + 1])))
-        group, at, share = _samples(fitted, output, part).by_segment
+        output, samples = _sampled(task, fitted, part)
+        group, at, share = samples.by_segment
         own = accepted[group] | ~np.isin(output.motions[at[:, 0]], beside)
         size = _size(task, *output.peaks(at[own], share[own]))
         np.maximum.at(largest, group[own], size)
@@ -313,9 +311,7 @@ def _evaluate(
     """Puts the largest errors of the groups ``part`` into ``size`` (G,), and by how much their points should move
     (P, 3) [m] and turn (P, 3) [rad] into ``steps``."""
     first, last = fitted.group_start[part.start], fitted.group_start[part.stop]
-    motions = fitted.motion[first:last]
-    output = RoundedOutput(task, fitted.division, np.unique(np.concatenate([motions, motions + 1])))
-    samples = _samples(fitted, output, part)
+    output, samples = _sampled(task, fitted, part)
     found = output.deviations(samples.at, samples.share)
     samples, found = _with_turns(samples, output, found)
     off, angle = lengths(found.shift), lengths(found.turn)
@@ -328,6 +324,15 @@ def _evaluate(
     steps[0][first:last] = _least_largest(weights, found.shift, samples, fitted, part)
     if task.turn_freely(fitted.row[first:last]):
         steps[1][first:last] = _least_largest(weights, found.turn, samples, fitted, part)
+
+
+def _sampled(
+    task: CompensationProblem, fitted: CornerDivision, part: slice
+) -> tuple[RoundedOutput, _CornerSamples]:
+    """The rounded path about the points of the groups ``part``, and the samples on it."""
+    motions = fitted.motion[fitted.group_start[part.start] : fitted.group_start[part.stop]]
+    output = RoundedOutput(task, fitted.division, np.unique(np.concatenate([motions, motions + 1])))
+    return output, _samples(fitted, output, part)
 
 
 def _samples(fitted: CornerDivision, output: RoundedOutput, part: slice) -> _CornerSamples:

@@ -98,8 +98,8 @@ def _split_intervals(motions: DivisibleMotions, at: Ints, share: Floats) -> None
 
 
 def _knots(motions: DivisibleMotions) -> tuple[Ints, Floats]:
-    """Rows (K,) and shares (K,) of their paths where ramps end or an axis crosses its gap, and a point may be
-    inserted."""
+    """Rows (K,) and shares (K,) of their paths where ramps end or an axis crosses its gap, and a point may be inserted:
+    on cuts alone, as in air nothing is cut between the points."""
     ramps = motions.task.force.ramps
     row, share = (np.empty(0, np.int64), np.empty(0)) if ramps is None else ramps.ends()
     if motions.task.lost_motion is not None:
@@ -115,6 +115,7 @@ def _knots(motions: DivisibleMotions) -> tuple[Ints, Floats]:
     )
     good = (
         motions.free[row]
+        & motions.task.carries[row]
         & np.isin(row, motions.rows[~motions.spline])
         & (share >= spacing)
         & (share <= 1.0 - spacing + 1e-12)

@@ -266,7 +266,7 @@ def _labels(curves: Curves, points: Floats, label: Floats, vertex: int) -> Float
 
 def _turns(curves: Curves, at: Floats) -> tuple[Ints, Floats]:
     """Of the places on polygons that are nearest to where their curves turn: the numbers (G, T) of the places before
-    them, by their parameters ``at`` (G, S), and how far (G, T) they are on the way to the next."""
+    them, by their parameters ``at`` (G, S), and the share (G, T) of the distance to the next."""
     rising = np.maximum.accumulate(at, axis=1)
     number = np.stack([np.sum(rising < turn[:, None], axis=1) for turn in curves.turn.T], axis=1)
     number = np.clip(number - 1, 0, at.shape[1] - 2)

@@ -92,8 +92,8 @@ def _turns_alike(motions: DivisibleMotions, entered: Ints) -> Bools:
     if len(at):
         start = motions.task.desired_path.start[before[at]].rotation
         turn = turn_between(start, motions.starts[motions.start_at[entered[at]]].rotation)
-        meant = half.vector[np.searchsorted(half.rows, before[at])]
-        alike[at] = (np.sum(turn * meant, axis=1) > 0) & (lengths(turn) < np.pi - HALF)
+        expected = half.vector[np.searchsorted(half.rows, before[at])]
+        alike[at] = (np.sum(turn * expected, axis=1) > 0) & (lengths(turn) < np.pi - HALF)
     return alike
 
 

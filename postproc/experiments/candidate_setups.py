@@ -150,7 +150,8 @@ def spacings(robot: Robot, spacing: float) -> Floats:
 
 
 def spreads(candidates: CandidateSetups) -> Floats | None:
-    """(n,) [rad, m] of each axis, whose shares sum up to 1 where two poses differ by ``offer.spread``; None without."""
+    """(n,) [rad, m] of each axis, whose shares sum up to 1 where two poses differ by ``candidates.spread``; None
+    without."""
     ranges = candidates.limits[:, 1] - candidates.limits[:, 0]
     moves = ranges > 0
     if not candidates.spread or not moves.any():

@@ -17,7 +17,7 @@ CODES = define(
         "PLN002": Code(
             "error",
             "no parameter is observable",
-            meaning="No pose and load of the offer shows any of the requested parameters.",
+            meaning="No candidate pose and load shows any of the requested parameters.",
             consequence="Measurements at such poses would not identify anything.",
             action="Choose other --loads, another --tool or --kind absolute, as the message proposes.",
             example="`--effects joint_offset` with the measurement of deflections.",

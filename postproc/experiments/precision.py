@@ -122,13 +122,13 @@ def designs(
     Others for which there are not enough distinct poses are left out.  Raises Refusal PLN001 (no pose can be measured),
     PLN002 (nothing that is asked for can be seen), PLN003 (no rest), PLN004 (not enough distinct poses).
     """
-    rng, offer, unknowns = np.random.default_rng(seed), task.setups, task.unknowns
+    rng, allowed, unknowns = np.random.default_rng(seed), task.setups, task.unknowns
     stage("looking for poses")
-    setups = drawn(task.model, offer, candidates, rng)
-    model = influential(task.model, unknowns, offer, setups[:FEW])
+    setups = drawn(task.model, allowed, candidates, rng)
+    model = influential(task.model, unknowns, allowed, setups[:FEW])
 
     def evaluated(some: Setups) -> Pool:
-        return pooled(some, observability(model, unknowns, offer, some))
+        return pooled(some, observability(model, unknowns, allowed, some))
 
     stage("computing what poses show")
     start = rested(model, setups, evaluated)
@@ -148,8 +148,8 @@ def designs(
         def chosen_from(pool: Pool, start_choice: Choice, criterion: Criterion = criterion) -> Choice:
             return _by_size(choices_of(task, observable, pool), criterion, sizes, start_choice, rng)
 
-        pool, chosen = refined(model, offer, start, evaluated, chosen_from, rng, stage)
-        enough(model, offer, poses, poses if poses in chosen else max(chosen, default=0))
+        pool, chosen = refined(model, allowed, start, evaluated, chosen_from, rng, stage)
+        enough(model, allowed, poses, poses if poses in chosen else max(chosen, default=0))
         wide = ~(_design(task, model, pool[chosen[poses]]).ci95 < HOPELESS * task.wanted)
         if not (hopeful.counts & wide).any() or not (hopeful.counts & ~wide).any():
             break

@@ -23,7 +23,7 @@ OTHER_STATION = 3.0
 """A registration that leaves so many times more than one of its own is not valid for other readings."""
 
 WIDER = 1.4
-"""Ratio of a bootstrap's interval to the one by covariance from which on it is worth telling."""
+"""Ratio of a bootstrap's interval to the one by covariance from which on it is worth reporting."""
 
 Progress = Callable[[int, int], None]
 

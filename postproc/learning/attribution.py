@@ -68,6 +68,11 @@ class Attribution:
         return self.prediction.causes
 
     @property
+    def effect_names(self) -> frozenset[str]:
+        """Effects that were named, and those of which the part does not tell which."""
+        return frozenset({one.name for one in self.named}.union(self.alternatives))
+
+    @property
     def surface(self) -> SmoothField:
         return self.explained.surface
 
@@ -131,6 +136,7 @@ class _Hypothesis:
     """The most probable causes ``x`` (P,) of a prediction, the points ``kept`` (K,), and how they are explained."""
 
     prediction: CausePrediction
+    layout: Layout
     x: Floats
     kept: Bools
     explained: Explanation
@@ -140,6 +146,10 @@ class _Hypothesis:
         """Logarithm of the probability of the deviations, outliers at their cost."""
         return self.explained.evidence + OUTLIERS_EACH * int((~self.kept).sum())
 
+    @property
+    def parts(self) -> tuple[CausePrediction, Layout, Floats, Bools, Explanation]:
+        return self.prediction, self.layout, self.x, self.kept, self.explained
+
 
 def attribute(
     prediction: CausePrediction, deviation: Floats, layout: Layout, around: Circumstances, search: bool = True
@@ -148,7 +158,8 @@ def attribute(
     x, kept = prediction.before[0].copy(), np.ones(len(deviation), bool)
     x, kept = _settle(prediction, deviation, layout, x, kept, outliers=True)
     explained = _explained(prediction, deviation, layout, x, kept)
-    bare = _Hypothesis(prediction, x, kept, explained)
+    measured = layout
+    bare = _Hypothesis(prediction, layout, x, kept, explained)
     named: list[Likelier] = []
     joined: list[MissingEffect] = []
     rivals: list[Likelier] = []
@@ -177,11 +188,11 @@ def attribute(
         if trial is None:
             break
         if len(joined) == 1 and len(named) == 1 and len(alike) == 1:
-            alone = _instead_of_first(bare, wide, deviation, layout, around)
+            alone = _instead_of_first(bare, wide, deviation, around)
             if alone is not None and alone.evidence > trial.evidence - NAMED:
                 # the first one only stood for this one
                 named, joined = [rivals[0]], [best.effect]
-                prediction, x, kept, explained = alone.prediction, alone.x, alone.kept, alone.explained
+                prediction, layout, x, kept, explained = alone.parts
                 offered = None
                 break
         if len(alike) > 1:
@@ -189,7 +200,7 @@ def attribute(
         else:
             named.append(rivals[0])
         joined.append(best.effect)
-        prediction, x, kept, explained = trial.prediction, trial.x, trial.kept, trial.explained
+        prediction, layout, x, kept, explained = trial.parts
     verdict = _verdict(bool(alternatives), bool(named), explained)
     mean, covariance = explained.causes()
     if search:
@@ -202,7 +213,7 @@ def attribute(
     return Attribution(
         prediction,
         deviation,
-        layout,
+        measured,
         kept,
         prediction.causes_at(mean),
         root @ covariance @ root.T,
@@ -233,11 +244,12 @@ def _with_effect(
     """The causes with those of an effect beside them; None where they cannot be found, or are as good as null.  A gap
     acts otherwise near its null than at its size: the likelier of two starts counts."""
     trial, found = prediction.with_causes(effect.causes, effect.model, effect.wide), []
+    layout = layout.with_noise(effect.column_sigma)
     for start in (0.0, 1.0):
         sizes = [start * cause.deviation for cause in effect.causes]
         try:
             moved, now = _settle(trial, deviation, layout, np.append(x, sizes), kept, outliers=True)
-            fit = _Hypothesis(trial, moved, now, _explained(trial, deviation, layout, moved, now))
+            fit = _Hypothesis(trial, layout, moved, now, _explained(trial, deviation, layout, moved, now))
         except np.linalg.LinAlgError:
             continue
         if np.isfinite(moved).all():
@@ -247,17 +259,17 @@ def _with_effect(
 
 
 def _instead_of_first(
-    bare: _Hypothesis, second: MissingEffect, deviation: Floats, layout: Layout, around: Circumstances
+    bare: _Hypothesis, second: MissingEffect, deviation: Floats, around: Circumstances
 ) -> _Hypothesis | None:
     """The effect that was named second, without the one that was named first: near the null one of two that are alike
     may look likelier that is not so at its true size."""
-    offered = candidates(bare.prediction, bare.x, around, _noise_of(layout, bare.kept))
+    offered = candidates(bare.prediction, bare.x, around, _noise_of(bare.layout, bare.kept))
     own = next((one for one in offered if (one.name, one.wide) == (second.name, second.wide)), None)
     if own is None:
         return None
     factor = second.causes[0].deviation / own.causes[0].deviation
     fits = [
-        _with_effect(bare.prediction, own.widened(size), deviation, layout, bare.x, bare.kept)
+        _with_effect(bare.prediction, own.widened(size), deviation, bare.layout, bare.x, bare.kept)
         for size in sorted({1.0, factor})
     ]
     return max((fit for fit in fits if fit is not None), key=lambda fit: fit.evidence, default=None)

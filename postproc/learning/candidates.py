@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.base.arrays import Floats
+from postproc.base.arrays import Floats, Ints
 from postproc.base.units import MM
 from postproc.effects import EFFECTS
 from postproc.learning.causes import Cause, CauseKind, CausePrediction
@@ -37,7 +37,9 @@ _SEEN = 0.3
 @dataclass(frozen=True, eq=False)
 class MissingEffect:
     """``name``; ``causes``: those that it adds; ``model``: with its effect; ``columns`` (K, Q) [m per standard
-    deviation]; ``transfers``: it holds at another place too; ``wide``: with the sides of axes in wide gaps."""
+    deviation]; ``transfers``: it holds at another place too; ``wide``: with the sides of axes in wide gaps;
+    ``column_sigma`` (K,) [m per standard deviation] or nothing: standard deviation of what it does to each point, where
+    it is not known whether it acts there."""
 
     name: str
     causes: tuple[Cause, ...]
@@ -45,24 +47,34 @@ class MissingEffect:
     columns: Floats
     transfers: bool
     wide: bool = False
+    column_sigma: Floats | None = None
 
     @property
     def family(self) -> str:
         """The effect without its joint."""
         return self.name.split(" ")[0]
 
+    def column_sigma_at(self, rows: Ints, factor: float) -> Floats | None:
+        """(J,) [m] ``column_sigma`` of points ``rows`` (J,) at ``factor`` standard deviations."""
+        return None if self.column_sigma is None else factor * self.column_sigma[rows]
+
     def widened(self, factor: float) -> MissingEffect:
-        """With ``factor`` times the standard deviations of its causes, and the same columns."""
+        """With ``factor`` times the standard deviations of its causes, with ``column_sigma`` of that size, and the same
+        columns."""
         wide = tuple(replace(cause, deviation=factor * cause.deviation) for cause in self.causes)
-        return replace(self, causes=wide)
+        return replace(
+            self, causes=wide, column_sigma=None if self.column_sigma is None else factor * self.column_sigma
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Circumstances:
-    """Of K points: ``corner`` (K,) 0..1, how far the feed turns within the cutter's radius; ``time`` (K,) 0..1, when
-    they were cut."""
+    """Of K points: ``corner`` (K,) 0..1, how far the feed turns within the cutter's radius; ``corner_sigma`` (K,) its
+    standard deviation, as it is not known from where on the force feels a corner; ``time`` (K,) 0..1, when they were
+    cut."""
 
     corner: Floats
+    corner_sigma: Floats
     time: Floats
 
 
@@ -157,7 +169,12 @@ def _of_process(prediction: CausePrediction, x: Floats, around: Circumstances) -
         )  # a force falls where the tool leaves, and never rises
         one = CausePrediction(points, model, (*prediction.causes, cause))
         columns = _own_columns(one, np.append(x, 0.0), 1) * size
-        found.append(MissingEffect(name, (cause,), model, columns, transfers=True))
+        sigma = None
+        if name == "corner_force":
+            full = replace(cause, weight=np.ones(len(weight)))
+            everywhere = CausePrediction(points, model, (*prediction.causes, full))
+            sigma = np.abs(_own_columns(everywhere, np.append(x, 0.0), 1)[:, 0] * size * around.corner_sigma)
+        found.append(MissingEffect(name, (cause,), model, columns, transfers=True, column_sigma=sigma))
     if np.ptp(around.time) > 0.05:
         drifts = [
             Cause(f"drift {axis}", "effect", CauseKind.SHIFT, DRIFT, "m", weight=points.normal[:, i] * around.time,

@@ -67,6 +67,10 @@ class Layout:
             self.place[rows], self.normal[rows], self.sigma[rows], self.free[rows], self.group[rows]
         )
 
+    def with_noise(self, more: Floats | None) -> Layout:
+        """With an error of standard deviation ``more`` (K,) [m] beside that of the probe, or the same."""
+        return self if more is None else replace(self, sigma=np.hypot(self.sigma, more))
+
     @cached_property
     def _square(self) -> Floats:
         inner = self.place @ self.place.T
@@ -171,6 +175,10 @@ class Explanation:
         return Explanation(
             self.layout, self.surface, self.rest, np.concatenate([self.columns, more], axis=1), self.by_force
         )
+
+    def with_noise(self, more: Floats | None) -> Explanation:
+        """With an error of standard deviation ``more`` (K,) [m] beside that of the probe, or the same."""
+        return self if more is None else replace(self, layout=self.layout.with_noise(more))
 
     def part(self, rows: Ints) -> Explanation:
         """Of some points (J,)."""

@@ -82,7 +82,8 @@ def weigh_effects(
     for i, one in enumerate(found[:REFINED]):
         rows = np.flatnonzero(one.kept)
         own = explained if one.kept is kept else everything.part(rows)
-        full = choose_surface(own.with_columns(one.factor * one.effect.columns[rows]), 1)
+        with_it = own.with_noise(one.effect.column_sigma_at(rows, one.factor))
+        full = choose_surface(with_it.with_columns(one.factor * one.effect.columns[rows]), 1)
         again = weighed(one.effect, one.kept, own.with_surface(full.surface))
         found[i] = replace(again, gain=max(one.gain, again.gain))
     return sorted(found, key=lambda one: -one.gain)
@@ -108,7 +109,8 @@ def _outside(kept: Bools) -> float:
 def _kept_with(everything: Explanation, effect: MissingEffect, kept: Bools) -> Bools:
     """(K,) those of the points ``kept`` (K,) that the causes and the effect do not contradict."""
     rows = np.flatnonzero(kept)
-    with_it = everything.part(rows).with_columns(max(FACTORS) * effect.columns[rows])
+    part = everything.part(rows).with_noise(effect.column_sigma_at(rows, max(FACTORS)))
+    with_it = part.with_columns(max(FACTORS) * effect.columns[rows])
     out = find_outliers(with_it, int(MOST_OUTLIERS * len(kept)) - int((~kept).sum()))
     found = kept.copy()
     found[rows[out]] = False
@@ -117,14 +119,19 @@ def _kept_with(everything: Explanation, effect: MissingEffect, kept: Bools) -> B
 
 def gains_with(explained: Explanation, effect: MissingEffect, rows: Ints) -> list[float]:
     """ln p(r | size) - ln p(r) for each size of ``FACTORS``; rows (J,): the effect's rows of the explained points."""
-    columns, rest = explained.whiten(effect.columns[rows]), explained.whiten(explained.rest)
-    gram, pull = columns.T @ columns, columns.T @ rest
     bounded = [i for i, cause in enumerate(effect.causes) if cause.positive]
-    gains = []
+    gains: list[float] = []
+    gram = pull = np.zeros(0)
     for factor in FACTORS:
+        gain = 0.0
+        if effect.column_sigma is not None or not gains:
+            own = explained.with_noise(effect.column_sigma_at(rows, factor))
+            columns, rest = own.whiten(effect.columns[rows]), own.whiten(explained.rest)
+            gram, pull = columns.T @ columns, columns.T @ rest
+            gain = own.evidence - explained.evidence
         precision = np.eye(len(gram)) + factor**2 * gram
         mean = np.linalg.solve(precision, factor * pull)
-        gain = 0.5 * factor * float(pull @ mean) - 0.5 * float(np.linalg.slogdet(precision)[1])
+        gain += 0.5 * factor * float(pull @ mean) - 0.5 * float(np.linalg.slogdet(precision)[1])
         if bounded:
             deviation = np.sqrt(np.diag(np.linalg.inv(precision)))
             gain += float(np.sum(np.log(2.0) + log_ndtr(mean[bounded] / deviation[bounded])))

@@ -30,6 +30,9 @@ from postproc.toolpath import Toolpath
 ROUNDED = 2 * MM
 """Half of the path over which a vertex counts as turned: a force does not step, and a step needs many points."""
 
+_REACH = 0.75, 1.25
+"""Radii of the cutter from a turn of the feed within which its force begins and ends to feel it."""
+
 _FLAT = 0.1
 """Cosine of the angle to the spindle below which a surface is a wall, and above 1 less which it is a floor."""
 
@@ -207,3 +210,8 @@ class FeedTurns:
         place = self.end[rows] - (1.0 - share) * self.length[rows]
         low, high = (np.interp(place + side * radius, self.station, self.turned) for side in (-1.0, 1.0))
         return np.asarray(np.clip((high - low) / (0.5 * np.pi), 0.0, 1.0))
+
+    def sigma_at(self, rows: Ints, share: Floats, radius: Floats) -> Floats:
+        """(K,) 0..1 standard deviation of that, as it is not known from where on the force feels a turn."""
+        less, more = (self.at(rows, share, reach * radius) for reach in _REACH)
+        return 0.5 * (more - less)

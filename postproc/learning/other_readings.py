@@ -73,14 +73,14 @@ def check_readings(
     warning where the sign is stated twice, or the next part, with ``gain`` of what was learnt, is no worse either
     way."""
     alone, deviation, present = len(parts) == 1, result.deviation, result.evidence
-    doubts: list[tuple[float, Floats, StatedPart]] = []
+    alternatives: list[tuple[float, Floats, StatedPart]] = []
     for part in parts:
         if not part.sign_seen:
             other = np.where(part.points, -deviation, deviation)
             turned = _likeliest(known, result, around, other, search=alone) - present
             if turned > (LIKELIER if alone and not part.sign_repeated else EXCHANGED):
                 return [wrong_sign(turned, part.file)]
-            doubts.append((turned, other, part))
+            alternatives.append((turned, other, part))
         if part.original:
             uncorrected = np.where(part.points, known.errors(known.before[0]), 0.0)
             # with effects of their own the two readings become alike: a loop may act as the correction does
@@ -88,18 +88,18 @@ def check_readings(
             compensated = evidence_of(known, deviation + uncorrected, result.layout) - stated
             if compensated > (LIKELIER if alone else EXCHANGED):
                 return [wrong_program(compensated, part.file)]
-    if len(doubts) > 1:
+    if len(alternatives) > 1:
         # one mistake in the template of a shop is in all its files
-        every = np.any([part.points for _, _, part in doubts], axis=0)
+        every = np.any([part.points for _, _, part in alternatives], axis=0)
         other = np.where(every, -deviation, deviation)
-        doubts.append((_likeliest(known, result, around, other) - present, other, doubts[0][2]))
-    unsure = [one for one in doubts if one[0] > -SURE]
-    if not unsure:
+        alternatives.append((_likeliest(known, result, around, other) - present, other, alternatives[0][2]))
+    undecided = [one for one in alternatives if one[0] > -SURE]
+    if not undecided:
         return []
-    for turned, other, part in unsure:
+    for turned, other, part in undecided:
         if not part.sign_repeated and _is_worse(result, other, parts[-1].points, gain):
             return [_unseen_sign("LRN020", turned, part)]
-    return [_unseen_sign("LRN019", unsure[0][0], unsure[0][2])]
+    return [_unseen_sign("LRN019", undecided[0][0], undecided[0][2])]
 
 
 def _is_worse(result: Attribution, other: Floats, last: Bools, gain: float) -> bool:

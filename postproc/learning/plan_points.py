@@ -24,8 +24,8 @@ FIELD = SmoothField(20e-6, 0.06)
 
 @dataclass(frozen=True)
 class PointPlan:
-    """chosen (N,): numbers of the points, the most telling first; ``before``, ``after`` [m]: RMS of the errors that the
-    surface may have, before and after they are measured."""
+    """chosen (N,): numbers of the points, the most informative first; ``before``, ``after`` [m]: RMS of the errors that
+    the surface may have, before and after they are measured."""
 
     chosen: Ints
     before: float

@@ -47,6 +47,8 @@ def promise(result: Attribution, last: Bools, gain: float = 1.0) -> Promise:
     variance = (
         held_out_variance(result.explained, own, taken) + (SCATTER * result.explained.by_force[own]) ** 2
     )
+    # where it is not known whether an effect acts, it may or may not on the next part
+    variance += result.explained.layout.sigma[own] ** 2 - result.layout.sigma[rows] ** 2
     withheld = (1 - gain) * (result.by_learning + result.by_field)[rows]
     after = float(np.sqrt(HOPE**2 * np.mean(variance) + np.mean(aligned(withheld, taken) ** 2)))
     return Promise(measured_rms(result, last), after, LOWER * after, UPPER * after)
@@ -70,7 +72,7 @@ def measured_rms(result: Attribution, of: Bools) -> float:
     own = np.flatnonzero(of[result.kept])
     if not len(own):
         return 0.0
-    layout = result.explained.layout
+    layout = result.layout.part(result.kept_rows)
     rest = aligned(result.deviation[result.kept_rows[own]], alignment_basis(layout.free[own]))
     return float(np.sqrt(max(float(np.mean(rest**2)) - float(np.mean(layout.sigma[own] ** 2)), 0.0)))
 

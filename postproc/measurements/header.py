@@ -135,8 +135,8 @@ def _joint_columns(table: CsvTable, heads: Collection[str], joints: Sequence[tup
     # T or B may be a joint as well as a time or an angle: alone it states nothing
     schemes = [(own, [name for name in own if name.lower() not in RESERVED])]
     schemes += [(names, names) for names in ([f"{letter}{i + 1}" for i in range(count)] for letter in "AJ")]
-    for names, telling in schemes:
-        if any(name.lower() in heads for name in telling):
+    for names, conclusive in schemes:
+        if any(name.lower() in heads for name in conclusive):
             for name in names:
                 if name.lower() not in heads:
                     raise table.header_error(

@@ -54,7 +54,7 @@ class Mechanics:
     @cached_property
     def chain(self) -> Chain:
         """The joints, with the extra coordinates that the effects need and no others."""
-        extras = (name for term in self.terms for name in term.effect.coordinates)
+        extras = [name for term in self.terms for name in term.effect.coordinates]
         return Chain(self.robot.joints, self.robot.flange, extras)
 
     @cached_property

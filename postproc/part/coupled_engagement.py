@@ -22,7 +22,8 @@ from postproc.compensation.subdivision import Subdivision
 from postproc.part.deflected_sweeps import axes_of, tips_of
 from postproc.part.displacement import Displacements
 from postproc.process.stock.cells import build_stock
-from postproc.process.stock.coupled import AS_STRAIGHT, UNSETTLED, Nodes, Pieces, solve_pieces
+from postproc.process.stock.coupled import AS_STRAIGHT, UNSETTLED, solve_pieces
+from postproc.process.stock.coupled_pieces import Nodes, Pieces
 from postproc.process.stock.displaced import displaced_rows
 from postproc.process.stock.distance import ANGLE, CUTTER, MODE, ROW, TURN
 from postproc.process.stock.engagement import laws_of, profiles_of

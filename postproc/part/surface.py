@@ -15,7 +15,8 @@ from postproc.base.batches import each_block
 from postproc.base.units import MM
 from postproc.part.part_figures import Surface
 from postproc.process.stock.blank import corners_of
-from postproc.process.stock.cells import Stock, nearest_sweep, stock_distance
+from postproc.process.stock.borrowed import borrowed
+from postproc.process.stock.cells import Stock, lent_stock, nearest_sweep, stock_distance
 from postproc.process.stock.compiled import compiled
 
 POINTS, MOST_NODES, FINEST = 60_000, 6_000_000, 0.05 * MM
@@ -72,6 +73,7 @@ def _crossings(stock: Stock, low: Floats, span: Floats, spacing: float) -> tuple
 @compiled
 def _fill(stock: Stock, origin: Floats, spacing: float, first: int, last: int, values: Floats) -> None:
     """``values`` (I, J, K) of the layers from ``first`` to ``last``: the sign of the distance at every node."""
+    stock, origin, values = lent_stock(stock), borrowed(origin), borrowed(values)
     count = values.shape[2]
     time = len(stock.sweeps)
     for i in range(first, last):
@@ -97,6 +99,8 @@ def _cross(
     stock: Stock, origin: Floats, spacing: float, edges: Ints, points: Floats, normals: Floats, sweep: Ints
 ) -> None:
     """The zero on each of the ``edges`` (K, 5) put into ``points`` (K, 3), with normal and sweep."""
+    stock, origin, edges = lent_stock(stock), borrowed(origin), borrowed(edges)
+    points, normals, sweep = borrowed(points), borrowed(normals), borrowed(sweep)
     time = len(stock.sweeps)
     at, to = np.zeros(3), np.zeros(3)
     for e in range(len(edges)):

@@ -15,7 +15,8 @@ import numpy as np
 from postproc.base.arrays import Floats, Ints
 from postproc.base.batches import each_block
 from postproc.part.surface import outward
-from postproc.process.stock.cells import Stock, build_stock, nearest_sweep
+from postproc.process.stock.borrowed import borrowed
+from postproc.process.stock.cells import Stock, build_stock, lent_stock, nearest_sweep
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.distance import pose_distance
 
@@ -53,6 +54,8 @@ def find_errors(nominal: Stock, rows: Floats, reach: float, points: Floats, norm
 
 @compiled
 def _errors(stock: Stock, points: Floats, normals: Floats, error: Floats, sweep: Ints, share: Floats) -> None:
+    stock, points, normals = lent_stock(stock), borrowed(points), borrowed(normals)
+    error, sweep, share = borrowed(error), borrowed(sweep), borrowed(share)
     time, reach = len(stock.sweeps), stock.grid[1]
     at, there = np.zeros(3), np.zeros(3)
     for i in range(len(points)):

@@ -38,7 +38,7 @@ TIGHT = 0.6
 
 
 def refine_place(room: Room, scoring: Scoring, score: Callable[[Floats], Scores], start: Floats) -> Scores:
-    """The scores of ``start`` (6,) and of all better placements on the way from there; ``score``: in detail."""
+    """The scores of ``start`` (6,) and of all better placements that the search passes; ``score``: in detail."""
     here = score(start[None])
     visited = [here]
     trust = FIRST

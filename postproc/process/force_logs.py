@@ -126,9 +126,9 @@ def _scale(
                     help="set the feed in the program before the motion ($VEL.CP, F), or record the log over s_mm",
                 )
             )
-        timed = (path_length.length > 0) & (toolpath.feed > 0)
-        extent = np.where(timed, path_length.length / np.where(timed, toolpath.feed, 1.0), 0.0)
-        uncounted |= (index > start) & ~timed
+        has_duration = (path_length.length > 0) & (toolpath.feed > 0)
+        extent = np.where(has_duration, path_length.length / np.where(has_duration, toolpath.feed, 1.0), 0.0)
+        uncounted |= (index > start) & ~has_duration
     # a first run-in to the cut is no loss; what is between cuts shifts all that comes after
     cutting = np.flatnonzero(~air & (extent > 0))
     uncounted &= (index > (cutting[0] if len(cutting) else len(index))) & (

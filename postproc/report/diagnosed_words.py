@@ -408,16 +408,16 @@ def _rejected(result: Diagnosed) -> Iterator[str]:
 
 
 def _better_trend(result: Diagnosed, candidate: Candidate) -> str:
-    """Which course explains clearly more than an effect; "" where none does."""
+    """Which form explains clearly more than an effect; "" where none does."""
     for alternative in result.diagnosis.search.rivals:
-        course = alternative.candidate.effect
+        form = alternative.candidate.effect
         if (
             alternative.of == candidate.key
-            and isinstance(course, AlternativeForm)
+            and isinstance(form, AlternativeForm)
             and alternative.fitted
             and alternative.margin < -MARGIN
         ):
-            what = f"{course.about} {alternative.candidate.joint}".strip()
+            what = f"{form.about} {alternative.candidate.joint}".strip()
             return (
                 f"; {what}, no effect of the library, has a likelihood gain {-alternative.margin:.0f} higher"
             )

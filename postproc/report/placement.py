@@ -30,7 +30,7 @@ KEYS = ("x_mm", "y_mm", "z_mm", "turn_deg", "tool_turn_deg", "track_mm")
 """Of the freedoms, in their order."""
 
 WORTH = 0.95
-"""A turned feed is worth telling where it leaves less than this share of the error."""
+"""A turned feed is worth reporting where it leaves less than this share of the error."""
 
 SHOWN_TURNS = 9
 """Of the whole path and of operations, in the table."""

@@ -100,7 +100,7 @@ class Planned(Result):
 
     def as_json(self) -> dict[str, object]:
         """The machine-readable result; the keys are public.  Intervals in the unit that is with them."""
-        offer = self.setups_offered
+        offered = self.setups_offered
         random = {
             str(size): {**self._intervals(ci95), "worst_ratio": _number(worst)}
             for size, (ci95, worst) in self.at_random.items()
@@ -109,10 +109,10 @@ class Planned(Result):
             "robot": self.robot,
             "robot_digest": self.digest,
             "effects": list(self.effects),
-            "kind": "deflection" if offer.deflection else "absolute",
-            "sigma_mm": round(offer.sigma / MM, 9),
-            "loads_kg": offer.loads.tolist(),
-            "each_load": offer.each_load,
+            "kind": "deflection" if offered.deflection else "absolute",
+            "sigma_mm": round(offered.sigma / MM, 9),
+            "loads_kg": offered.loads.tolist(),
+            "each_load": offered.each_load,
             "criterion": self.criterion,
             "seed": self.seed,
             "candidates": self.candidates,
@@ -169,13 +169,15 @@ def show_plan(console: Console, planned: Planned, verbose: bool = False) -> None
 
 def plan_facts(planned: Planned) -> Iterator[tuple[str, str]]:
     """What was asked for, and of what was chosen."""
-    offer = planned.setups_offered
+    offered = planned.setups_offered
     yield "robot", f"{planned.robot}, effects: {', '.join(planned.effects)}"
     yield "plan", f"{planned.poses} poses, {planned.loads_in_words}: {planned.readings} readings"
-    place = _list(np.concatenate([offer.tool.position / MM, abc_from_rotation(offer.tool.rotation) / DEG]))
-    measures = ", ".join(offer.targets) + (" (approximate positions)" if offer.rough else "") or "the TCP"
-    kind = "deflection, loaded minus unloaded" if offer.deflection else "position in the tracker's frame"
-    yield "measured", f"{kind}, of {measures}; {offer.sigma / MM:g} mm per coordinate (1 sigma)"
+    place = _list(
+        np.concatenate([offered.tool.position / MM, abc_from_rotation(offered.tool.rotation) / DEG])
+    )
+    measures = ", ".join(offered.targets) + (" (approximate positions)" if offered.rough else "") or "the TCP"
+    kind = "deflection, loaded minus unloaded" if offered.deflection else "position in the tracker's frame"
+    yield "measured", f"{kind}, of {measures}; {offered.sigma / MM:g} mm per coordinate (1 sigma)"
     yield "load", f"at the TCP, {place} mm deg on the flange"
     if planned.fixed:
         yield (
@@ -186,8 +188,9 @@ def plan_facts(planned: Planned) -> Iterator[tuple[str, str]]:
     if planned.rivals is None:
         yield "wanted", planned.wanted_source
     sight = ""
-    if offer.tracker is not None:
-        sight = f", visible from {_list(offer.tracker / MM)} mm within {offer.cone / DEG:g} deg of a reflector's axis"
+    if offered.tracker is not None:
+        cone = f"{offered.cone / DEG:g} deg of a reflector's axis"
+        sight = f", visible from {_list(offered.tracker / MM)} mm within {cone}"
     yield (
         "chosen from",
         f"{planned.candidates} random poses within axis limits and box{sight}, and poses near the best",

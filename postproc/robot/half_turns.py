@@ -40,7 +40,7 @@ LARGE = 30 * DEG
 """A pose cannot turn by half a turn while all six axes turn by less."""
 
 WIDE = 90 * DEG
-"""An axis that turns by more between two motions is followed on the way."""
+"""An axis that turns by more between two motions is followed through the motion."""
 
 FINE = 60 * DEG
 """By so much an axis may turn between two looks at a way."""

@@ -282,16 +282,18 @@ def _check(
     runs = [[tree(run.node) for run in top.sections("identified")] for top in (old, new)]
     entries = old.sections("effects")
     continued = {place: effect for effect, place in places if place is not None}
-    meant = [continued.get(i) for i in range(len(entries))]
-    meant += [effect for effect, place in places if place is None]
+    intended = [continued.get(i) for i in range(len(entries))]
+    intended += [effect for effect, place in places if place is None]
     holds = (
         others[0] == others[1]
         and runs[0] == runs[1][:-1]
-        and len(robot.effects) == len(meant)
-        and all(_reads(entry, effect) for entry, effect in zip(robot.effects, meant, strict=True) if effect)
+        and len(robot.effects) == len(intended)
+        and all(
+            _reads(entry, effect) for entry, effect in zip(robot.effects, intended, strict=True) if effect
+        )
         and all(
             _untouched(was, effect) == _untouched(now.section, effect)
-            for was, now, effect in zip(entries, robot.effects, meant, strict=False)
+            for was, now, effect in zip(entries, robot.effects, intended, strict=False)
         )
         and _states(robot.identified[-1], identified)
     )

@@ -129,7 +129,9 @@ CELL: dict[str, Schema] = {
             )
         },
     ),
-    "force_ramp": number("path over which a force changes, mm [the tool's radius, where it is known]", 0.0),
+    "force_ramp": number(
+        "path over which a force changes, mm [the tool's radius, where it is known]", 0.0, 500.0
+    ),
     "process": text("process file (YAML)"),
     "correct": text(
         "process: the effect of the force; absolute: all errors of the model; touched_off: these less the rigid"
@@ -172,11 +174,11 @@ CELL: dict[str, Schema] = {
         minProperties=1,
     ),
     "orientation": mapping(_ABC, about="of the tool in the base, for programs that state none, deg"),
-    "tolerance": number("path error that may remain, mm [0.02]", above=0.0),
-    "tolerance_deg": number("the same of the orientation, deg [0.01]", above=0.0),
-    "max_correction": number("mm; more is an error [10]", above=0.0),
-    "min_segment": number("shortest motion after subdivision, mm [1]", above=0.0),
-    "max_growth": number("motions of the output at most, as a multiple of the input's [2]", 1.0),
+    "tolerance": number("path error that may remain, mm [0.02]", high=500.0, above=0.0),
+    "tolerance_deg": number("the same of the orientation, deg [0.01]", high=45.0, above=0.0),
+    "max_correction": number("mm; more is an error [10]", high=500.0, above=0.0),
+    "min_segment": number("shortest motion after subdivision, mm [1]", high=500.0, above=0.0),
+    "max_growth": number("motions of the output at most, as a multiple of the input's [2]", 1.0, 1e6),
     "controller": mapping(
         {
             "absolute_accuracy": flag("the controller corrects its geometry itself"),

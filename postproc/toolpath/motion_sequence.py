@@ -17,6 +17,8 @@ class MotionSequence(MotionColumns):
 
     ``approximation`` (N,) [m]: the controller may depart from the path that far before the end point; 0 where it stops
     or passes exactly, NaN where the distance is not known.
+    ``approximation_number`` (N,): what the text states in the place of a distance (the number of CNT; below zero the
+    register that has it), NaN where it states none.
     ``stops`` (N,): the controller comes to rest at the end point: it is not approximated (``approximation`` is 0), and
     is no inner point of a spline block; without it wherever ``approximation`` is 0.
     ``continues`` (N,): in every execution the motion starts where the row before it ends, and no other motion starts
@@ -29,6 +31,7 @@ class MotionSequence(MotionColumns):
     """
 
     approximation: Floats = field(default_factory=not_given, metadata=column(default=0.0))
+    approximation_number: Floats = field(default_factory=not_given, metadata=column(default=np.nan))
     stops: Bools = field(default_factory=not_given)
     continues: Bools = field(default_factory=not_given, metadata=column(dtype=np.bool_, default=True))
     predecessors: Mapping[int, tuple[int, ...]] = field(default_factory=dict)

@@ -290,6 +290,27 @@ def _same_branch(
     return np.asarray(original.track.branch[rows] == run.track.branch[run_rows])
 
 
+def _same_approximation(
+    original: CompensationProblem, run: CompensationProblem, rows: Ints, run_rows: Ints
+) -> Bools:
+    """An end point is approximated as the one that it represents; one that is inserted into a motion that stops, as the
+    language writes it."""
+    one, two, limits = original.toolpath, run.toolpath, original.toolpath.constraints
+    number, other = one.sequence.approximation_number[rows], two.sequence.approximation_number[run_rows]
+    distance, own = one.approximation[rows], two.approximation[run_rows]
+    inserted = limits.inserted_approximation[rows]
+    same = _equal(number, other) & _equal(distance, own)
+    # where a control may stop or not, the distance is not known at the last part of a motion alone
+    same |= np.isnan(distance) & np.isnan(number) & np.isnan(other) & np.isfinite(own)
+    named = np.isfinite(own) & np.isnan(other) | np.isnan(own) & np.isnan(inserted)
+    same |= stops(one)[rows] & named & _equal(np.full(len(rows), limits.inserted_number), other)
+    return np.asarray(same | stops(two)[run_rows])
+
+
+def _equal(one: Floats, two: Floats) -> Bools:
+    return np.isclose(one, two, rtol=1e-6, atol=1e-9, equal_nan=True)
+
+
 def _same_external(
     original: CompensationProblem, run: CompensationProblem, rows: Ints, run_rows: Ints
 ) -> Bools:
@@ -311,7 +332,7 @@ def _other_external(
     start, end, here = one[np.maximum(row - 1, 0)], one[row], two[motions.row]
     start = np.where(np.isfinite(start), start, end)
     rate = np.abs(end - start) / np.maximum(simulator.original.desired_path.length[row], NEAR)[:, None]
-    # where the run passes beside the point that it states, so do the axes beside theirs
+    # where the run misses the point that it states, the axes miss theirs
     passed = np.append(RunPath.of(run).reach, 0.0)[motions.row + 1]
     near = np.maximum(passed, simulator.original.tolerance)[:, None]
     apart = np.abs(here - start - share * (end - start)) > SAME_EXTERNAL + rate * near
@@ -329,6 +350,7 @@ _TRAITS = (
     ("the motion has another base or tool", _same_frames),
     ("the motion has another feed", _same_feed),
     ("the motion has another configuration of the robot", _same_branch),
+    ("the motion has another approximation", _same_approximation),
 )
 """What a motion shares with the one of the original that it means."""
 

@@ -166,13 +166,13 @@ def _away(
     serve."""
     more = np.arange(extra + 1)
     total = np.zeros(extra + 1)
-    probes, loose = (rows, rows[-1:]) if len(rows) else (np.array([stop - 1]), np.array([stop - 1]))
+    probes, movable = (rows, rows[-1:]) if len(rows) else (np.array([stop - 1]), np.array([stop - 1]))
     for row in probes:
         feasible = more[np.isfinite(total)]
         at = row + shift + feasible
         distance = _apart(original, run, np.full(len(at), row), at)
         # in air targets are corrected as well where not the process alone is
-        limit = SAME if original.process and row not in loose else original.max_correction
+        limit = SAME if original.process and row not in movable else original.max_correction
         other = ~_alike(original, run, np.full(len(at), row), at)
         total[feasible] += np.where(distance <= limit, distance + _OTHER_MOTION * other, np.inf)
     return total

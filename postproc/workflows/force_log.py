@@ -54,17 +54,17 @@ def _bias(ready: Prepared) -> str:
     solved = solve_coupled(run, paths_of(run), displaced, lever_of(run))
     if isinstance(solved, str):
         return f"their bias is not known, because {solved}"
-    meant = lengths(run.engagement.mean[:, :3])
-    there = lengths(_means(solved.key, solved.wrench[:, :3], len(meant)))
-    length = np.bincount(run.sweeps.motion, run.sweeps.length, len(meant))
+    stated = lengths(run.engagement.mean[:, :3])
+    there = lengths(_means(solved.key, solved.wrench[:, :3], len(stated)))
+    length = np.bincount(run.sweeps.motion, run.sweeps.length, len(stated))
     # on an arc the mean force turns with the feed
-    cuts = np.flatnonzero(run.engagement.cuts & (task.toolpath.kind == Kind.LIN) & (meant > 0))
+    cuts = np.flatnonzero(run.engagement.cuts & (task.toolpath.kind == Kind.LIN) & (stated > 0))
     if not len(cuts):
         return "their bias is not known, because no straight motion cuts"
-    share = there[cuts] / meant[cuts] - 1.0
+    share = there[cuts] / stated[cuts] - 1.0
     low, high = int(np.argmin(share)), int(np.argmax(share))
     line = task.toolpath.line[cuts]
-    total = (there * length)[cuts].sum() / (meant * length)[cuts].sum() - 1.0
+    total = (there * length)[cuts].sum() / (stated * length)[cuts].sum() - 1.0
     return (
         f"they differ, by the stock of {process.name}, from those of the compensated robot by {100 * total:+.1f} % in"
         f" the mean, from {100 * share[low]:+.0f} % (line {line[low]})"

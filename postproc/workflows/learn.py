@@ -242,8 +242,14 @@ def _findings(
     out = np.flatnonzero(~result.kept)
     for number in out[:SHOWN].tolist():
         message = f"the deviation {matched.deviation[number] / MM:+.3f} mm is an outlier, and is excluded"
+        help = ""
+        if matched.around.corner[number] > 0.0 and "corner_force" not in result.effect_names:
+            message += "; it is in a corner, where a larger force would do this too"
+            help = "measure more points in the corners; they show which of the two it is"
         findings.append(
-            Finding("LRN006", message, str(parts[matched.file[number]].file), int(matched.line[number]))
+            Finding(
+                "LRN006", message, str(parts[matched.file[number]].file), int(matched.line[number]), help=help
+            )
         )
     if len(out) > SHOWN:
         findings.append(

@@ -195,6 +195,7 @@ def match(
     before = np.maximum(row - 1, 0)
     around = Circumstances(
         job.corners.at(row, points.share, job.radius[row]),
+        job.corners.sigma_at(row, points.share, job.radius[row]),
         job.time[before] + points.share * (job.time[row] - job.time[before]),
     )
     return Matched(
@@ -242,8 +243,8 @@ def _touched(
     if findings:
         raise Refusal(*findings[:1])
     keep = np.flatnonzero(contacts.touched)
-    unsure = _ambiguous(job, point, normal, contacts)
-    keep = keep[~unsure[keep]]
+    ambiguous = _ambiguous(job, point, normal, contacts)
+    keep = keep[~ambiguous[keep]]
     command, gone = None, 0
     if other is not None and pairing is not None:
         command, lost = commands_at(
@@ -266,7 +267,7 @@ def _touched(
     if len(good) < len(part):
         words = f"{len(part) - len(good)} of {len(part)} points are not used:"
         words += f" {int((~contacts.touched).sum())} are touched by no tool"
-        words += f", {int(unsure.sum())} may be cut by more than one motion"
+        words += f", {int(ambiguous.sum())} may be cut by more than one motion"
         if gone:
             words += f", {gone} are not reached by the program that cut the part"
         rows = np.setdiff1d(np.arange(len(part)), keep[good])
@@ -323,18 +324,18 @@ def _restricted(job: CutProgram, part: MeasuredPart) -> dict[int, Ints]:
 
 def _ambiguous(job: CutProgram, point: Floats, normal: Floats, contacts: Contacts) -> Bools:
     """(K,) points that an earlier motion is predicted to have cut deeper than the last one."""
-    unsure = np.zeros(len(point), bool)
+    ambiguous = np.zeros(len(point), bool)
     twice = np.flatnonzero(contacts.before.row >= 0)
     if not len(twice):
-        return unsure
+        return ambiguous
     errors = []
     for visit in (contacts.last, contacts.before):
         states = touched_points(
             job.ready.task, job.spindle, (visit.row[twice], visit.share[twice]), (point[twice], normal[twice])
         )
         errors.append(states.errors(job.ready.model))
-    unsure[twice] = errors[1] < errors[0] - DEEPER
-    return unsure
+    ambiguous[twice] = errors[1] < errors[0] - DEEPER
+    return ambiguous
 
 
 def _joined(several: Sequence[TouchedPoints]) -> TouchedPoints:

@@ -60,14 +60,14 @@ pose repeats its errors too.  Of two random poses it is a third."""
 def next_poses(measured: Measured, diagnosis: Diagnosis, payload: float, pulls: bool) -> NextPoses | None:
     """Poses, of those loads and targets that were used, at which the explanations disagree most; None where none do.
     ``payload`` [kg]: the heaviest weight that may be hung; ``pulls``: forces can be pulled with."""
-    offer = _candidate_setups(measured, diagnosis.search.final, payload, pulls)
+    candidates = _candidate_setups(measured, diagnosis.search.final, payload, pulls)
     # where the arm was it can go again
-    narrow = replace(offer, limits=_measured_ranges(measured.readings.q, offer.limits))
-    if measured.readings.deflection and not len(offer.loads) + len(offer.pulls):
+    narrow = replace(candidates, limits=_measured_ranges(measured.readings.q, candidates.limits))
+    if measured.readings.deflection and not len(candidates.loads) + len(candidates.pulls):
         return None  # what can be hung or pulled with is not known
     sets = [(first, others[:TRIED]) for first, *others in diagnosis.verdict.alternatives]
     # poses that differ less are better than none
-    for offered in (narrow, offer, replace(offer, spread=0.0)):
+    for offered in (narrow, candidates, replace(candidates, spread=0.0)):
         plans = [
             plan for first, others in sets for plan in _plans(measured, diagnosis, offered, first, others)
         ]

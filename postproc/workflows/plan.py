@@ -110,14 +110,14 @@ def plan(request: PlanRequest, stage: Stage = silent) -> Planned:
     robot = load_robot(find_robot(request.robot))
     model = StiffnessModel.from_robot(robot)
     asked = asked_for(model, request.effects)
-    offer = _candidate_setups(request, robot, asked.model, asked.unknowns)
+    candidates = _candidate_setups(request, robot, asked.model, asked.unknowns)
     if request.discriminate is not None:
-        planned = _discriminating_poses(request, offer, asked.model, asked.unknowns, stage)
+        planned = _discriminating_poses(request, candidates, asked.model, asked.unknowns, stage)
     else:
-        planned = _for_precision(request, offer, asked.model, asked.unknowns, stage)
+        planned = _for_precision(request, candidates, asked.model, asked.unknowns, stage)
     order = measuring_order(planned.setups.q, spacings(robot, DEG))
     setups = planned.setups[order]
-    readings = _in_sight(offer, planned.model, setups)
+    readings = _in_sight(candidates, planned.model, setups)
     files = {request.output: measurements_csv(readings, _about(request, planned, len(readings)))}
     reports = [path for path in (request.json, request.page) if path is not None]
     planned = replace(
@@ -409,20 +409,20 @@ def _in_sight(candidates: CandidateSetups, model: StiffnessModel, setups: Setups
 
 def _about(request: PlanRequest, planned: Planned, readings: int) -> list[str]:
     """Comments at the head of a plan: what it is, and what to do with it."""
-    offer = planned.setups_offered
+    candidates = planned.setups_offered
     lines = [
         f"plan of compensate {__version__}, robot file sha256 {planned.digest[:16]}, seed {planned.seed}",
         planned.goal,
         f"{planned.poses} poses, {planned.loads_in_words}, {readings} readings",
     ]
-    if offer.deflection:
+    if candidates.deflection:
         lines.append(
             "fill in DX, DY, DZ in mm, loaded minus unloaded with the axes locked, in axes of the robot base"
         )
     else:
         lines.append("fill in X, Y, Z in mm")
-    if offer.rough:
-        for name, place in zip(offer.targets, offer.places / MM, strict=True):
+    if candidates.rough:
+        for name, place in zip(candidates.targets, candidates.places / MM, strict=True):
             lines.append(f"reflector {name} about {place[0]:g} {place[1]:g} {place[2]:g} mm on the flange")
     if planned.setups.direction is not None:
         lines.append(

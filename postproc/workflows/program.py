@@ -345,7 +345,7 @@ def _output_paths(program: Program, target: Path) -> list[Path]:
 def _not_over_inputs(ready: Prepared, outputs: Sequence[str]) -> None:
     cell = ready.cell
     # a force may be a file, read in this run or not, or be stated in numbers, which name none
-    named = (cell.path.parent / name for name in (cell.force, cell.process) if name)
+    named = [cell.path.parent / name for name in (cell.force, cell.process) if name]
     ready.inputs.refuse_outputs(map(Path, outputs), named)
     if len({place(Path(output)) for output in outputs}) < len(outputs):
         raise Refusal(Finding("FIL007", "two outputs have the same name", outputs[0]))

@@ -43,6 +43,14 @@ CODES = define(
             action="Add it to the effect: options: {reference: 20}.",
             example="`temperature: 24` in the cell.",
         ),
+        "FIL015": Code(
+            "error",
+            "feed that no machine has",
+            meaning="A motion states a feed of more than 100 m/s.",
+            consequence="No point could be inserted that the controller runs without slowing.",
+            action="Correct the feed; KRL states m/s, G-code mm or inches a minute, RAPID and TP mm/s.",
+            example="`$VEL.CP=1000000`.",
+        ),
         "CEL012": Code(
             "error",
             "touch points do not fit the program",

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.base.arrays import Floats
-from postproc.base.findings import Finding, Topic
+from postproc.base.findings import Finding, Refusal, Topic
 from postproc.base.units import DEG, MM
 from postproc.cell import Cell
 from postproc.languages.dialect import Program
@@ -17,16 +17,32 @@ from postproc.robot.description import Robot
 from postproc.robot.makers import maker_of
 from postproc.toolpath import Kind, Toolpath
 
+FASTEST = 100.0
+"""[m/s] Feeds above it are written in another unit, or mistyped: points that the controller runs without slowing are
+farther apart than any cut is long."""
+
 
 def reader_findings(program: Program, path: Toolpath) -> list[Finding]:
     """The findings of the reader, but for the external axes: what they carry, the cell has stated by now; and the
-    motions at which one of them is not known."""
+    motions at which one of them is not known.
+
+    Raises Refusal FIL015 where a motion states a feed that no machine has.
+    """
+    _refuse_impossible_feeds(path, program.documents[0].path)
     findings = [finding for finding in program.findings if finding.topic is not Topic.EXTERNAL_AXES]
     lost = [finding for finding in path.constraints.refused.values() if finding.code == "EXT004"]
     if lost:
         more = f" ({len(lost)} motions)" if len(lost) > 1 else ""
         findings.append(replace(lost[0], message=lost[0].message + more))
     return findings
+
+
+def _refuse_impossible_feeds(path: Toolpath, file: Path) -> None:
+    beyond = np.flatnonzero((path.feed > FASTEST) & ~path.inverse_time_feed)
+    if len(beyond):
+        feed = f"the feed is {float(path.feed[beyond[0]]):g} m/s ({len(beyond)} motions)"
+        message = f"{feed}; no machine is faster than {FASTEST:g} m/s"
+        raise Refusal(Finding("FIL015", message, str(file), int(path.line[beyond[0]])))
 
 
 def start_findings(cell: Cell, robot: Robot, start: Floats | None) -> list[Finding]:

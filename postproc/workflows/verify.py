@@ -15,6 +15,7 @@ from postproc.base.units import DEG, MM
 from postproc.output.atomic_write import write_atomically
 from postproc.report.report import Spread, exit_code, in_order_of_place, json_bytes
 from postproc.report.verified import PathComparison, Verified, WorstError
+from postproc.verification.approximation_words import other_words
 from postproc.verification.differences import Difference, PathManner, in_air, missing, on_cuts
 from postproc.verification.pairing import Different, pair_motions
 from postproc.verification.simulator import STEP, Simulation, Simulator
@@ -251,7 +252,13 @@ def _differences(
         differences += missing(simulator, after.samples)
     lines = {True: other.task.toolpath.line, False: ready.task.toolpath.line}
     files = {True: compensated, False: original}
-    findings = _grouped(differences, lambda one: (one.what, one.run), lines, files)
+    stated = other_words(*([one.raw for one in which.program.documents] for which in (ready, other)))
+    if stated is not None:
+        message = f"the program states another approximation: {stated[0]}"
+        words = [Finding("VER005", message, str(compensated), stated[1])]
+    else:
+        words = []
+    findings = words + _grouped(differences, lambda one: (one.what, one.run), lines, files)
     for what, name in (
         ("the motion leads against the feed", "backwards"),
         ("the motion has no length", "idle"),

@@ -3,6 +3,7 @@
 
 ``--package FOLDER`` judges the package that lies there.  ``--drawn COUNT [--seed S]``: of so many programs drawn at
 random instead, where a line with exit 0 that failed, or whose error ``verify`` does not see, is a defect.
+``--third yes``: what ``third`` finds by brute force is printed beside (a minute a case).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from .drawn import defects, drawn
 from .force import RULE
 from .further_cases import FURTHER
 from .motion import MM
+from .third import third
 
 HEADER = (
     f"{'case':38} {'exit':>4} {'before':>8} {'after':>8} {'out mm':>8} {'rms':>8} {'axis deg':>8} {'ori deg':>8}"
@@ -43,8 +45,14 @@ def row(outcome: Outcome) -> str:
     )
 
 
+def _by_force(folder: Path) -> str:
+    output = next(file for file in (folder / "compensated").iterdir() if file.suffix in (".src", ".ngc"))
+    largest, line, _ = third(folder / output.name, output, folder / "cell.yaml")
+    return f"  by brute force {largest / MM:.4f} (line {line})"
+
+
 def main(words: list[str]) -> int:
-    failed, rule, package, count, seed = 0, "", PACKAGE, 0, 0
+    failed, rule, package, count, seed, brute = 0, "", PACKAGE, 0, 0, False
     if "--help" in words:
         print(__doc__)
         return 0
@@ -56,6 +64,8 @@ def main(words: list[str]) -> int:
             count = int(value)
         elif option == "--seed":
             seed = int(value)
+        elif option == "--third":
+            brute = value == "yes"
         else:
             package = Path(value).resolve()
     print(HEADER, flush=True)
@@ -71,9 +81,12 @@ def main(words: list[str]) -> int:
             continue
         with tempfile.TemporaryDirectory() as folder:
             outcome = run(case, Path(folder), verify=True, rule=rule or RULE, package=package)
+            by_force = _by_force(Path(folder)) if brute and outcome.verdict is not None else ""
         wrong = defects(outcome) if count else outcome.failed
         failed += bool(wrong)
-        print(row(outcome) + (f"  DEFECT: {'; '.join(wrong)}" if count and wrong else ""), flush=True)
+        print(
+            row(outcome) + by_force + (f"  DEFECT: {'; '.join(wrong)}" if count and wrong else ""), flush=True
+        )
     print(f"{failed} failed" if not count else f"{failed} of {count} with a defect")
     return 1 if failed else 0
 

@@ -81,6 +81,10 @@ def run(case: Case, folder: Path, verify: bool = False, rule: str = RULE, packag
         outcome.flips = _flips(output, Cell.load(folder / "cell.yaml"))
         if outcome.flips:
             outcome.failed.append(f"turns back {outcome.flips} times")
+        told = _command("verify", program, output, "--force", "--json", "-", package=package)
+        if done.returncode == 0 and told.returncode:
+            said = json.loads(told.stdout)
+            outcome.failed.append("verify rejects it: " + ", ".join(_codes(said)))
         return outcome
     try:
         outcome.verdict = judge(program, output, folder / "cell.yaml", step=case.step, rule=rule)

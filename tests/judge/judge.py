@@ -18,7 +18,7 @@ from .cell import Cell
 from .force import RULE, STRETCHED, Field
 from .motion import MM, Motion
 from .path import Path
-from .placing import BETWEEN, Tools, find_places, nearest_across_leaps, settle_places
+from .placing import Tools, beside_neighbours, divided, find_places, nearest_across_leaps
 from .reader import read
 from .robot import Robot, check_on_mujoco, rotation_vectors, rotations
 
@@ -212,23 +212,27 @@ def sample_labels(path: Path, low: int, high: int, step: float) -> np.ndarray:
 
 
 def _along(wanted: Path, cut: tuple, path: Path, rows: tuple, one: Field, nodes: tuple, step: float) -> dict:
+    def at(label: np.ndarray) -> Tools:
+        return Tools(path, rows, label, nodes)
+
     label = sample_labels(path, *rows, step)
-    tools = Tools(path, rows, label, nodes)
+    tools = at(label)
     place, lost = find_places(wanted, cut, one, label, tools)
     for _ in range(ROUNDS):
         distance = np.linalg.norm(tools.loaded(one.at(place))[0] - wanted.points(place, *cut), axis=1)
         more = np.union1d(_beside_worst(label, distance), _at_vertices(wanted, cut, label, place))
         more = np.setdiff1d(more, label)
-        finer = Tools(path, rows, more, nodes)
-        found, gone = settle_places(
-            wanted, cut, one, np.interp(more, label, place), finer.loaded, reaches=BETWEEN
-        )
-        label = np.concatenate([label, more[~gone]])
+        found = beside_neighbours(wanted, cut, one, (label, place), more, at(more))
+        gone = np.isnan(found)
+        unsettled = label[lost]
+        label, place = np.append(label, more[~gone]), np.append(place, found[~gone])
         order = np.argsort(label, kind="stable")
-        label = label[order]
-        place, lost = (np.concatenate(two)[order] for two in ((place, found[~gone]), (lost, gone[~gone])))
-        place = nearest_across_leaps(wanted, cut, one, label, place, lambda at: Tools(path, rows, at, nodes))
-        tools = Tools(path, rows, label, nodes)
+        label, place = label[order], place[order]
+        if path is not wanted:  # of the original alone nothing is judged
+            label, place = divided(wanted, cut, one, label, place, at)
+            place = nearest_across_leaps(wanted, cut, one, label, place, at)
+            label, place = divided(wanted, cut, one, label, place, at)
+        tools, lost = at(label), np.isin(label, unsettled)
     motion, _ = path.find(label, *rows)
     wrench = one.at(place)
     there, tilted, _ = tools.loaded(wrench)
@@ -304,7 +308,8 @@ def _missed(wanted: Path, cut: tuple, place: np.ndarray, there: np.ndarray) -> f
 def _backwards(
     path: Path, rows: tuple, motion: np.ndarray, place: np.ndarray, wanted: Path, cut: tuple
 ) -> list[int]:
-    """Motions of a cut that lead against the feed of the original's path, where they begin and where they end."""
+    """Motions of a cut that lead against the feed of the original's path: where they begin, in their middle, at their
+    end."""
     found = []
     first = np.searchsorted(motion, np.arange(rows[0], rows[1] + 2))
     for i in range(rows[0], rows[1] + 1):
@@ -312,7 +317,7 @@ def _backwards(
         way = path.place[i, 1] - path.place[i, 0]
         if b <= a or path.arc[i]:
             continue
-        feed = wanted.direction(place[[a, b]], *cut)
+        feed = wanted.direction(place[[a, (a + b) // 2, b]], *cut)
         feed /= np.linalg.norm(feed, axis=1, keepdims=True)
         if (feed @ way < -BACKWARDS).all():
             found.append(i)

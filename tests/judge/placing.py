@@ -18,14 +18,22 @@ GRID, POINTS = 0.02 * MM, 50_000
 """Steps in which places are looked for, larger where a cut would have more of them."""
 NEARBY = 5.0 * MM
 """A tool this far from the path counts, along a stretch of it, as much as a jump along the path of the same length."""
-MARCHES, ROUNDS, BESIDE = 3, 8, 6
+MARCHES, ROUNDS, SMOOTH = 3, 8, 6
 REACHES, CLOSE = (1.1, 3.3, 10.0, 30.0, 100.0), (0.5, 3.0, 10.0)
 BETWEEN = (0.1, *CLOSE, 30.0)
+FROM_GUESS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 6.0)
 """Steps of the grid to either side in which a place is looked for again, one after the other."""
 SETTLED = 1e-10
-LEAP, LEAST_LEAP, AROUND, PARTS = 4.0, 0.05 * MM, 1.0 * MM, 400
-"""Where a place leaps, by so many times the way of the program and so much at least, there may be two: so far around it
-all places across the leap are looked for, on so many parts of it."""
+APART, NEAREST, MOST = 0.01 * MM, 1e-7, 200_000
+"""By how much more or less than the program the places of two samples beside each other may go on without samples
+between them, how near these may come to each other [m], and how many there may be."""
+BESIDE, OFF_GUESS, AROUND, PARTS, TRIED, WALKS = 0.05 * MM, 0.3 * MM, 1.0 * MM, 400, 3, 60
+"""Where a place leaps there may be two: of samples so far around it all places across the leap, and so much beside it,
+are looked for, on so many parts, and so many are tried; the leap goes on then to where both are as near, in so many
+rounds at most."""
+
+SPREAD = np.concatenate([side * 1e-8 * 2.0 ** np.arange(14) for side in (-1, 1)])
+"""[m] Further places beside either side of a leap: two may be there close to each other."""
 
 
 class Tools:
@@ -72,7 +80,7 @@ def find_places(
     there, _, _ = loaded(one.at(place))
     # beside a corner places may have been looked for on the wrong side: those between the good ones are others
     away = np.linalg.norm(there - wanted.points(place, *cut), axis=1)
-    near = np.lib.stride_tricks.sliding_window_view(np.pad(away, BESIDE, mode="edge"), 2 * BESIDE + 1)
+    near = np.lib.stride_tricks.sliding_window_view(np.pad(away, SMOOTH, mode="edge"), 2 * SMOOTH + 1)
     good = ~lost & (away <= 2.0 * np.median(near, axis=1) + 1e-7)
     between = np.interp(label, label[good], place[good]) if good.any() else place
     other, still = settle_places(wanted, cut, one, between, loaded, CLOSE)
@@ -97,33 +105,119 @@ def settle_places(
     return place, lost
 
 
+def divided(
+    wanted: Path, cut: tuple, one: Field, label: np.ndarray, place: np.ndarray, tools_at: Callable
+) -> tuple[np.ndarray, np.ndarray]:
+    """Labels and places (S,), with samples between those whose places go on by more or less than the program, by
+    halves: until no two are ``APART``, or both sides of a leap are there.  ``tools_at``: ``Tools`` at labels."""
+    missing = np.zeros(0)
+    while len(label) < MOST:
+        step = np.diff(label)
+        k = np.flatnonzero((np.abs(np.diff(place) - step) > APART) & (step > NEAREST))
+        more = np.setdiff1d(0.5 * (label[k] + label[k + 1]), missing)
+        if not len(more):
+            break
+        there = beside_neighbours(wanted, cut, one, (label, place), more, tools_at(more))
+        good = np.isfinite(there)
+        missing = np.append(missing, more[~good])
+        order = np.argsort(np.append(label, more[good]), kind="stable")
+        label, place = np.append(label, more[good])[order], np.append(place, there[good])[order]
+    return label, place
+
+
+def beside_neighbours(
+    wanted: Path, cut: tuple, one: Field, known: tuple[np.ndarray, np.ndarray], more: np.ndarray, tools: Tools
+) -> np.ndarray:
+    """The places (M,) of further labels (M,), ``tools`` theirs, between those of the ``known`` labels and places beside
+    them; NaN where there is none."""
+    label, place = known
+    k = np.clip(np.searchsorted(label, more) - 1, 0, len(label) - 2)
+    low, high = np.sort(np.stack([place[k], place[k + 1]]), axis=0)
+    margin = (0.1 * (high - low) + 0.1 * APART)[:, None]
+    between, middle = np.stack([low, high], axis=1), 0.5 * (low + high)
+    return nearest_between(wanted, cut, one, middle, tools, between, margin, PARTS // 10)
+
+
 def nearest_across_leaps(
     wanted: Path, cut: tuple, one: Field, label: np.ndarray, place: np.ndarray, tools_at: Callable
 ) -> np.ndarray:
-    """The labels ``place`` (S,), with those of the nearer place where there are two; ``tools_at``: ``Tools`` at
-    labels."""
+    """The labels ``place`` (S,), with those of the nearer place where there are two."""
     place = place.copy()
-    for k in np.flatnonzero(np.diff(place) > LEAP * np.diff(label) + LEAST_LEAP):
-        rows = np.flatnonzero(np.abs(label - label[k]) < AROUND)
-        tools = tools_at(label[rows])
-        at = np.linspace(place[k] - LEAST_LEAP, place[k + 1] + LEAST_LEAP, PARTS + 1)
-        wrench, points, tangents = one.at(place[rows]), wanted.points(at, *cut), wanted.direction(at, *cut)
-        there, _, gives = tools.loaded(wrench)
-        other = place[rows].copy()
-        for j in range(len(rows)):
-            beside = there[j] + (one.at(at) - wrench[j]) @ gives[j].T - points
-            ahead = (beside * tangents).sum(1)
-            here = np.flatnonzero((ahead[:-1] > 0) & (ahead[1:] <= 0))
-            if len(here):
-                best = here[np.argmin((beside[here] ** 2).sum(1))]
-                other[j] = at[best] + (at[1] - at[0]) * ahead[best] / (ahead[best] - ahead[best + 1])
-        found, gone = settle_places(wanted, cut, one, other, tools.loaded, (0.02, 0.1, 0.5))
-        away = [
-            np.linalg.norm(tools.loaded(one.at(p))[0] - wanted.points(p, *cut), axis=1)
-            for p in (place[rows], found)
-        ]
-        place[rows] = np.where(~gone & (away[1] < away[0]), found, place[rows])
+
+    def away(rows: np.ndarray, tools: Tools, at: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(tools.loaded(one.at(at))[0] - wanted.points(at, *cut), axis=1)
+
+    as_near: set[float] = set()
+    for _ in range(WALKS):
+        walked = False
+        for k in np.flatnonzero(np.abs(np.diff(place) - np.diff(label)) > APART):
+            if label[k] in as_near:
+                continue
+            rows = np.flatnonzero(np.abs(label - label[k]) < AROUND)
+            tools = tools_at(label[rows])
+            low, high = np.sort(place[k : k + 2])
+            between = np.tile([low, high], (len(rows), 1))
+            moved = False
+            # under the force of either side too, as the tool is not linear in it
+            for guess in (place[rows].copy(), np.full(len(rows), low), np.full(len(rows), high)):
+                found = nearest_between(wanted, cut, one, guess, tools, between, BESIDE, PARTS)
+                other = np.where(np.isfinite(found), found, place[rows])
+                nearer = away(rows, tools, other) < away(rows, tools, place[rows]) - SETTLED
+                place[rows] = np.where(nearer, other, place[rows])
+                moved |= bool(nearer.any())
+            walked |= moved
+            if not moved:
+                as_near.add(label[k])
+        if not walked:
+            break
     return place
+
+
+def nearest_between(
+    wanted: Path,
+    cut: tuple,
+    one: Field,
+    place: np.ndarray,
+    tools: Tools,
+    between: np.ndarray,
+    beside: float | np.ndarray,
+    parts: int,
+) -> np.ndarray:
+    """Of all places between two labels (S, 2), and ``beside`` these [m], looked for on so many ``parts``, the nearest
+    (S,) of each of the ``tools``, NaN without one; the forces of ``place`` (S,) are the first guess."""
+    ends = wanted.start[cut[0]], wanted.start[cut[1] + 1]
+    low, high = np.clip(between + beside * np.array([-1.0, 1.0]), *ends).T
+    sides = between.T
+    wrench = one.at(place)
+    there, _, gives = tools.loaded(wrench)
+    size = max(1, 200_000 // parts)
+    tried = np.full((TRIED, len(place)), np.nan)
+    for first in range(0, len(place), size):
+        rows = slice(first, first + size)
+        even = np.linspace(low[rows], high[rows], parts + 1, axis=1)
+        beside_sides = [side[rows, None] + SPREAD for side in sides]
+        at = np.sort(np.concatenate([even, *beside_sides], axis=1), axis=1)
+        at = np.clip(at, low[rows, None], high[rows, None])
+        along = at.ravel()
+        force = one.at(along).reshape(*at.shape, 6) - wrench[rows, None]
+        beside = there[rows, None] + force @ gives[rows].swapaxes(1, 2)
+        beside -= wanted.points(along, *cut).reshape(*at.shape, 3)
+        ahead = (beside * wanted.direction(along, *cut).reshape(*at.shape, 3)).sum(2)
+        k, here = np.nonzero((ahead[:, :-1] > 0) & (ahead[:, 1:] <= 0))
+        order = np.lexsort(((beside[k, here] ** 2).sum(1), k))
+        k, here = k[order], here[order]
+        number = np.arange(len(k)) - np.searchsorted(k, k)
+        k, here, number = (v[number < TRIED] for v in (k, here, number))
+        share = ahead[k, here] / np.maximum(ahead[k, here] - ahead[k, here + 1], 1e-15)
+        tried[number, first + k] = at[k, here] + (at[k, here + 1] - at[k, here]) * share
+    best, least = np.full(len(place), np.nan), np.full(len(place), np.inf)
+    for start in tried:
+        none = np.isnan(start)
+        found, gone = settle_places(wanted, cut, one, np.where(none, place, start), tools.loaded, FROM_GUESS)
+        away = np.linalg.norm(tools.loaded(one.at(found))[0] - wanted.points(found, *cut), axis=1)
+        away = np.where(none | gone | (np.abs(found - start) > OFF_GUESS), np.inf, away)
+        best, least = np.where(away < least, found, best), np.minimum(least, away)
+    return best
 
 
 def _march(

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import compileall
 import json
 import math
 import os
 import signal
 import subprocess
 import sys
-import time
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from mutation import covered, judging
+from mutation import judging, stream
 from mutation.mutants import Mutant, mutants, sample
 
 HOME = Path(__file__).parent.parent.parent
@@ -35,8 +33,8 @@ SLOW = (  # browsers, hundreds of processes, thousands of programs: a mutant is 
     "fuzz",
     "rs274",
 )
-FIRST_S = 3.0
-"""Processor seconds of tests that a mutant meets first: most fall at once."""
+FIRST = 12
+"""Tests that a mutant which is imported anew meets first: most fall at once, and few files are collected."""
 Z = 1.959963984540054
 """Two-sided 95 % of the normal distribution."""
 
@@ -69,71 +67,48 @@ def tree_of(folder: Path, revision: str) -> Path:
     return tree
 
 
-def cover_of(folder: Path, tree: Path, words: list[str]) -> covered.Cover:
-    """What the suite covers, or those of its files whose names hold one of ``words``; measured once a folder."""
-    kept = folder / "cover.json"
-    if not kept.exists():
-        compileall.compile_dir(tree, quiet=1)
-        pid = os.fork()  # the tests' modules stay out of this process
-        if pid == 0:
-            code = 1
-            try:
-                judging.stay(tree)
-                sys.dont_write_bytecode = False  # read by every judgement
-                tests = [
-                    str(path.relative_to(tree))
-                    for path in sorted((tree / "tests").glob("test_*.py"))
-                    if not any(word in path.name for word in SLOW)
-                    and (not words or any(word in path.name for word in words))
-                ]
-                covered.cover(tree, [folders[0] for folders in ROOMS.values()], tests).save(kept)
-                code = 0
-            finally:
-                os._exit(code)
-        if os.waitpid(pid, 0)[1]:
-            raise RuntimeError("the tests could not be measured")
-    return covered.load(kept)
+def tests_of(tree: Path, words: list[str], without: list[str]) -> list[str]:
+    """Files of tests whose names hold one of ``words``, where there are any, and none of ``without``."""
+    return [
+        str(path.relative_to(tree))
+        for path in sorted((tree / "tests").glob("test_*.py"))
+        if not any(word in path.name for word in [*SLOW, *without])
+        and (not words or any(word in path.name for word in words))
+    ]
 
 
-class Judge:
-    """Judges mutants in a tree; tests that killed before come earlier."""
+@dataclass(frozen=True)
+class Drawn:
+    """A mutant of a sample: the file's text with it, and the line before and after."""
 
-    def __init__(self, folder: Path, tree: Path, cover: covered.Cover, seconds: float) -> None:
-        self.folder, self.tree, self.cover, self.seconds = folder, tree, cover, seconds
-        self.kills: dict[str, int] = {}
+    room: str
+    mutant: Mutant
+    text: str
+    before: str
+    after: str
 
-    def rounds(self, mutant: Mutant) -> list[dict[str, float]]:
-        """Tests that reach the mutant, cheap ones and old killers first: a first round and the rest."""
-        cost = self.cover.seconds
-        names = self.cover.reaching(mutant.path, mutant.first_line, mutant.line)
-        names.sort(key=lambda name: (cost[name] + 0.02) / (1 + self.kills.get(name, 0)))
-        first: dict[str, float] = {}
-        rest: dict[str, float] = {}
-        spent = 0.0
-        for name in names:
-            spent += cost[name]
-            if spent <= FIRST_S or not first:
-                first[name] = cost[name]
-            elif spent <= self.seconds:
-                rest[name] = cost[name]
-        return [tests for tests in (first, rest) if tests]
 
-    def judge(self, mutant: Mutant, text: str) -> tuple[str, str]:
-        """The verdict and the test at which it fell."""
-        path = self.tree / mutant.path
-        kept, stat = path.read_bytes(), path.stat()
-        verdict, test = "not reached", ""
-        try:
-            path.write_text(text, encoding="utf-8")
-            for tests in self.rounds(mutant):
-                verdict, test = judging.judge(self.tree, tests, self.folder)
+def judge(
+    folder: Path, tree: Path, mutant: Mutant, text: str, tests: dict[str, float], tier: str
+) -> tuple[str, str]:
+    """The verdict, and the test at which it fell, of tests (with their seconds, in their order) that come by a mutant;
+    the mutant is written into the tree, and all is imported anew."""
+    if not tests:
+        return "not reached", ""
+    path = tree / mutant.path
+    kept, stat = path.read_bytes(), path.stat()
+    names = list(tests)
+    try:
+        path.write_text(text, encoding="utf-8")
+        for some in (names[:FIRST], names[FIRST:]):
+            if some:
+                verdict, test = judging.judge(tree, {name: tests[name] for name in some}, folder, tier)
                 if verdict != "survived":
-                    self.kills[test] = self.kills.get(test, 0) + 1
                     break
-        finally:
-            path.write_bytes(kept)
-            os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
-        return verdict, test if verdict != "survived" else ""
+    finally:
+        path.write_bytes(kept)
+        os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+    return verdict, test if verdict != "survived" else ""
 
 
 def changed(before: str, after: str) -> tuple[str, str]:
@@ -158,10 +133,31 @@ def row(name: str, total: int, results: list[dict]) -> str:
     )
 
 
+def drawn(
+    tree: Path, rooms: list[str], size: int, seed: int, kept: Path
+) -> tuple[dict[str, int], list[Drawn]]:
+    """The number of mutants in each room, and a sample of each; drawn once a folder."""
+    if kept.exists():
+        read = json.loads(kept.read_text())
+        return read["totals"], [Drawn(**{**one, "mutant": Mutant(**one["mutant"])}) for one in read["chosen"]]
+    totals, chosen = {}, []
+    for room in rooms:
+        files = sorted(
+            str(path.relative_to(tree)) for top in ROOMS[room] for path in (tree / top).rglob("*.py")
+        )
+        sources = {file: (tree / file).read_text(encoding="utf-8") for file in files}
+        found = [mutant for file in files for mutant in mutants(tree, file)]
+        totals[room] = len(found)
+        for mutant, text in sample(found, size, seed, sources):
+            chosen.append(Drawn(room, mutant, text, *changed(sources[mutant.path], text)))
+    kept.write_text(json.dumps({"totals": totals, "chosen": [asdict(one) for one in chosen]}))
+    return totals, chosen
+
+
 def main(words: list[str] | None = None) -> int:
-    """Judges samples; results stand in FOLDER/<room>-<seed>.jsonl, one mutant a line, and are taken up again."""
+    """Judges samples; results are in FOLDER/mutants.jsonl, one mutant a line; a run that was stopped goes on."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__)
-    parser.add_argument("folder", type=Path, help="for the revision's files, what tests cover, and results")
+    parser.add_argument("folder", type=Path, help="for the revision's files and for results, of one sample")
     parser.add_argument("--room", action="append", choices=sorted(ROOMS))
     parser.add_argument("--sample", type=int, default=250, metavar="N")
     parser.add_argument("--seed", type=int, default=1)
@@ -169,43 +165,43 @@ def main(words: list[str] | None = None) -> int:
         "--seconds", type=float, default=60.0, help="processor seconds of tests that one mutant meets"
     )
     parser.add_argument("--revision", default="HEAD")
-    parser.add_argument(
-        "--tests", nargs="*", default=[], metavar="WORD", help="only test files with such a word"
-    )
+    parser.add_argument("--tier", choices=("fast", "all"), default="fast", help="which tests")
+    parser.add_argument("--tests", nargs="*", default=[], metavar="WORD", help="only files with such a word")
+    parser.add_argument("--without", nargs="*", default=[], metavar="WORD", help="no files with such a word")
+    parser.add_argument("--near", action="store_true", help="only files that import what is in the rooms")
     asked = parser.parse_args(words)
     folder = asked.folder.resolve()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # the file that is mutated is put back
+    tier = judging.FAST if asked.tier == "fast" else judging.ALL
     tree = tree_of(folder, asked.revision)
-    judging.warm()
-    judge = Judge(folder, tree, cover_of(folder, tree, asked.tests), asked.seconds)
-    table = []
-    for room in asked.room or ["effects", "compensation", "krl", "gcode"]:
-        files = sorted(
-            str(path.relative_to(tree)) for top in ROOMS[room] for path in (tree / top).rglob("*.py")
-        )
-        sources = {file: (tree / file).read_text(encoding="utf-8") for file in files}
-        found = [mutant for file in files for mutant in mutants(tree, file)]
-        kept = folder / f"{room}-{asked.seed}.jsonl"
-        results = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []
-        known = {(one["path"], one["operator"], one["occurrence"]): one for one in results}
-        judged = []
-        start = time.monotonic()
-        for number, (mutant, text) in enumerate(sample(found, asked.sample, asked.seed, sources), 1):
-            one = known.get((mutant.path, mutant.operator, mutant.occurrence))
-            if one is None:
-                verdict, test = judge.judge(mutant, text)
-                before, after = changed(sources[mutant.path], text)
-                one = {**asdict(mutant), "verdict": verdict, "test": test, "before": before, "after": after}
-                with kept.open("a", encoding="utf-8") as out:
-                    out.write(json.dumps(one) + "\n")
-            judged.append(one)
-            if number % 10 == 0:
-                alive = sum(one["verdict"] in ("survived", "not reached") for one in judged)
-                print(
-                    f"{room}: {number} judged, {alive} alive, {time.monotonic() - start:.0f} s",
-                    file=sys.stderr,
-                )
-        table.append(row(room, len(found), judged))
+    judging.warm(tier)
+    rooms = asked.room or ["effects", "compensation", "krl", "gcode"]
+    totals, chosen = drawn(tree, rooms, asked.sample, asked.seed, folder / "drawn.json")
+    tests = tests_of(tree, asked.tests, asked.without)
+    if asked.near:
+        tests = [
+            test for test in tests if stream.is_near(tree, test, [top for r in rooms for top in ROOMS[r]])
+        ]
+    pairs = [(one.mutant, one.text) for one in chosen]
+    log = folder / "stream.jsonl"
+    seen = stream.run(tree, pairs, tests, log, asked.seconds, tier)
+    results = []
+    for number, one in enumerate(chosen):
+        if number not in seen.verdicts:
+            verdict, test = judge(
+                folder, tree, one.mutant, one.text, seen.choice(number, asked.seconds), tier
+            )
+            line = {"mutant": number, "verdict": verdict, "test": test}
+            seen.add(line)
+            with log.open("a", encoding="utf-8") as out:
+                out.write(json.dumps(line) + "\n")
+        verdict, test = seen.verdicts[number]
+        result = {"room": one.room, **asdict(one.mutant), "verdict": verdict, "test": test}
+        tests_met = len(seen.choice(number, asked.seconds))
+        results.append({**result, "tests": tests_met, "before": one.before, "after": one.after})
+    (folder / "mutants.jsonl").write_text("".join(json.dumps(one) + "\n" for one in results))
+    print(f"{len(seen.seconds)} tests, {sum(seen.seconds.values()):.0f} s of the processor")
     print("room          mutants  sampled  killed  timeout  survived  not reached  killed % (95 %)")
-    print("\n".join(table))
+    for room in rooms:
+        print(row(room, totals[room], [one for one in results if one["room"] == room]))
     return 0

@@ -35,6 +35,16 @@ KINDS = {
 LEFT_OUT = {"RemoveDecorator", "VariableReplacer", "VariableInserter"}
 
 
+NO_OPERATORS = frozenset(["(", ")", "[", "]", "{", "}", ",", ".", ":", ";", "=", "->", ":=", "@"])
+NO_PLACES = {
+    *("name", "string", "fstring_start", "fstring_string", "fstring_end", "newline", "endmarker"),
+    *("file_input", "suite", "simple_stmt", "expr_stmt", "return_stmt", "trailer", "atom", "atom_expr"),
+    *("arglist", "argument", "parameters", "param", "subscriptlist", "subscript", "dictorsetmaker"),
+    *("testlist_comp", "testlist_star_expr", "fstring", "fstring_expr", "strings", "funcdef", "classdef"),
+}
+"""Types of nodes at which no operator mutates: nine of ten."""
+
+
 @dataclass(frozen=True)
 class Mutant:
     """One mutation: ``occurrence`` counts the operator's places in the file, as cosmic-ray does."""
@@ -111,6 +121,8 @@ class _Places(Visitor):
         self._counted = dict.fromkeys(names, 0)
 
     def visit(self, node: parso.tree.NodeOrLeaf) -> parso.tree.NodeOrLeaf:
+        if node.type in NO_PLACES or (node.type == "operator" and node.value in NO_OPERATORS):
+            return node
         quiet: bool | None = None
         for name, operator in self._operators:
             for start, _ in operator.mutation_positions(node):

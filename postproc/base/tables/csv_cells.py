@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.batches import each_block
 from postproc.base.decimals import plain_decimals
 from postproc.base.tables.csv_lines import NOTHING, CsvLines
 from postproc.base.tables.csv_spelling import as_text
@@ -119,13 +120,16 @@ class CsvColumn(Sequence[str]):
         one: reads the cell of a row that is no plain number, of its row and its text.
         """
         values = np.empty(len(self))
-        for rows in _blocks(len(self)):
+
+        def read(rows: slice) -> None:
             block, plain = self._plain(rows, comma)
             if not plain.all():
                 texts = self._texts(rows)
                 for at in np.flatnonzero(~plain).tolist():
                     block[at] = one(rows.start + at, texts[at])
             values[rows] = block
+
+        each_block(read, len(self), ROWS)
         return values
 
     def _plain(self, rows: slice, comma: bool) -> tuple[Floats, Bools]:

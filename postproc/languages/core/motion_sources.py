@@ -8,8 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+START, ELSEWHERE = -1, -2
+"""In the place of a motion: the start of the program; what the program does not contain."""
+
 MOST = 30
 """Motions before another one that are distinguished."""
+FEW = 8
+"""Of them those that a place keeps apart which is met but once, and so has no meeting of its own."""
 
 
 class Meeting:
@@ -40,8 +45,18 @@ def met(own: frozenset[Source], other: frozenset[Source], meeting: Meeting) -> f
     return frozenset([meeting])
 
 
-def expanded(sources: Iterable[Source], visited: set[Meeting]) -> set[int]:
+def together(sources: frozenset[Source]) -> frozenset[Source]:
+    """The same sources, as one new meeting where they are more than ``FEW``."""
+    if len(sources) <= FEW:
+        return sources
+    meeting = Meeting()
+    meeting.sources |= sources
+    return frozenset([meeting])
+
+
+def expanded(sources: Iterable[Source], visited: set[Meeting] | None = None) -> set[int]:
     """What is among sources, with those after meetings that are not in ``visited``, to which they are added."""
+    visited = set() if visited is None else visited
     found: set[int] = set()
     todo = list(sources)
     while todo:

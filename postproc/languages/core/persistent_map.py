@@ -77,6 +77,14 @@ class PersistentMap:
         root = _merged(own.root, others.root, depth, 0, self.numbers.keys, merge)
         return self if root is own.root else PersistentMap(self.numbers, root, depth)
 
+    def common(self, other: PersistentMap) -> PersistentMap:
+        """The keys that have equal values in both; the map itself where these are all of its own.  It takes no time
+        for what only ``other`` has."""
+        depth = max(self.depth, other.depth)
+        own, others = (m._deepened(depth) for m in (self, other))
+        root = _common(own.root, others.root, depth)
+        return self if root is own.root else PersistentMap(self.numbers, root, depth)
+
     def _deepened(self, depth: int) -> PersistentMap:
         if depth == self.depth:
             return self
@@ -123,3 +131,20 @@ def _merged(
                 continue
         merged[at], changed = new, True
     return tuple(merged) if changed else own
+
+
+def _common(own: tuple[Any, ...], other: tuple[Any, ...], depth: int) -> tuple[Any, ...]:
+    kept: list[Any] | None = None
+    for at, (one, two) in enumerate(zip(own, other, strict=True)):
+        if one is None or one is two:
+            continue
+        if two is None:
+            new = None
+        elif depth:
+            new = _common(one, two, depth - 1)
+        else:
+            new = one if one == two else None
+        if new is not one:
+            kept = list(own) if kept is None else kept
+            kept[at] = new
+    return own if kept is None else tuple(kept)

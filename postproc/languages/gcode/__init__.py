@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from postproc.base.document import Document, Edit
+from postproc.languages.core.dialect_defaults import DialectDefaults
 from postproc.languages.dialect import (
     MARK,
     PLAIN,
@@ -26,42 +27,26 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class GcodeDialect:
+class GcodeDialect(DialectDefaults):
     """G-code of one control as a ``Dialect``.
 
-    control: its table, with what a program of these bytes names; made where it is asked for, as tables take their time
-    to build.  semicolon: comments start with one, parentheses are none.
+    recognises: whether a file of this name and content is for it.  control: its table, with what a program of these
+    bytes names; made where it is asked for, as tables take their time to build.  semicolon: comments start with one,
+    parentheses are none.
     """
 
     name: str
+    recognises: Callable[[Path, bytes], bool]
     control: Callable[[bytes], Control]
     semicolon: bool = False
 
-    @property
-    def family(self) -> str:
-        return "G-code"
-
-    @property
-    def suffixes(self) -> tuple[str, ...]:
-        return ()
-
-    @property
-    def letters(self) -> bytes:
-        """Those of coordinates, of G and F that hold for inserted blocks too, and of CIP and EX."""
-        return b"ABCEFGIJKPRXYZ"
-
-    @property
-    def companion_suffixes(self) -> tuple[str, ...]:
-        return ()
+    family: ClassVar[str] = "G-code"
+    letters: ClassVar[bytes] = (
+        b"ABCEFGIJKPRXYZ"  # coordinates, G and F that hold for inserted blocks too, CIP, EX
+    )
 
     def claims(self, path: Path, raw: bytes) -> bool:
-        return detection.CLAIMS[self.name](path, raw)
-
-    def companions(self, path: Path) -> list[Path]:
-        return []
-
-    def main_file(self, companion: Path) -> Path:
-        return companion
+        return self.recognises(path, raw)
 
     def siblings(
         self, program: Program, settings: ReadingSettings, beside: Path | None = None
@@ -86,9 +71,6 @@ class GcodeDialect:
         plain = MARK + text.replace("(", "[").replace(")", "]")
         said = (f";{plain}" if self.semicolon else f"({plain})").encode("latin-1", "replace")
         return put_mark(program, said)
-
-    def renamed(self, program: Program, stem: str) -> list[Edit]:
-        return []
 
 
 def _kuka_cnc(raw: bytes) -> Control:
@@ -116,9 +98,9 @@ def _linuxcnc(raw: bytes) -> Control:
 
 
 DIALECTS = (
-    GcodeDialect("kuka_cnc", _kuka_cnc, semicolon=True),
-    GcodeDialect("sinumerik", _sinumerik, semicolon=True),
-    GcodeDialect("fanuc", _fanuc),
-    GcodeDialect("linuxcnc", _linuxcnc),
+    GcodeDialect("kuka_cnc", detection.is_kuka_cnc, _kuka_cnc, semicolon=True),
+    GcodeDialect("sinumerik", detection.is_sinumerik, _sinumerik, semicolon=True),
+    GcodeDialect("fanuc", detection.is_fanuc, _fanuc),
+    GcodeDialect("linuxcnc", detection.is_gcode, _linuxcnc),
 )
 """In the order in which they are asked whether a file is theirs."""

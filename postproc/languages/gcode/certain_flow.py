@@ -24,7 +24,6 @@ from postproc.languages.gcode.source import Source
 from postproc.languages.gcode.words import key
 
 _CODE = re.compile(r"(?<![A-Z_])[GM][ \t]*[\d#\[]", re.I)
-_ENDS = (2, 17, 30, *RETURNS)
 
 
 def follow(execution: Execution, control: Control, once: Ints) -> ExecutionFlow:

@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Ints
 from postproc.base.document import Document, Span
-from postproc.languages.core.row_facts import SPEAKS
+from postproc.languages.core.comments_in_force import SPEAKS
 from postproc.languages.dialect import MARK
 from postproc.languages.gcode.source import Source
 from postproc.toolpath import Annotation

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any, NamedTuple
@@ -97,6 +97,33 @@ class ModalCode(NamedTuple):
 
 UNKNOWN = -1
 """Value of a group that cannot be determined."""
+
+
+FIRST_NAME = 1000
+"""Codes of names are numbers from here on."""
+
+
+def modal_codes(entries: Iterable[tuple[Group, int, Iterable[float]]]) -> dict[int, ModalCode]:
+    """Number of a code times ten -> what it says; of several entries the last holds."""
+    return {
+        round(number * 10): ModalCode(group, int(value))
+        for group, value, numbers in entries
+        for number in numbers
+    }
+
+
+def named_codes(
+    entries: Iterable[tuple[Group, int, str]], separator: str | None = None
+) -> tuple[dict[bytes, tuple[float, ...]], dict[int, ModalCode]]:
+    """Name -> the numbers of its codes, and what these say; ``separator``: between the names of an entry."""
+    names: dict[bytes, tuple[float, ...]] = {}
+    codes: dict[int, ModalCode] = {}
+    for group, value, said in entries:
+        for name in said.split(separator):
+            number = float(FIRST_NAME + len(codes))
+            codes[round(number * 10)] = ModalCode(group, int(value))
+            names[name.encode()] = (*names.get(name.encode(), ()), number)
+    return names, codes
 
 
 class LexedLine(NamedTuple):

@@ -304,10 +304,10 @@ def no_insert_before(words: BlockWords, rows: Ints, in_other_file: Bools) -> dic
         more |= words.number(word) > usual
     # Machine axes: what is inserted has no words for them.
     more |= words.has(*(key(letter) for letter in "ABC")) & (modal.force[Group.TCP] != 1)
-    timed = modal.force[Group.FEED] == Feed.INVERSE_TIME
+    inverse_time = modal.force[Group.FEED] == Feed.INVERSE_TIME
     found: dict[int, str] = {}
     for mask, why in (
-        (timed, "F is the time of the whole block (G93)"),
+        (inverse_time, "F is the time of the whole block (G93)"),
         (in_other_file, "its block is in another file"),
         (more, "its block contains more than the motion"),
         (modal.flow.entered, "a jump leads to its block"),

@@ -103,7 +103,7 @@ def cycle_ends(words: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
     moved = (
         words.motion[:, None] & (hows >= 0) & ~placed & ~(cycle[:, None] & (axis[:, None] == np.arange(3)))
     )
-    loose = np.maximum.accumulate(np.where(moved, number, -1), axis=0)
+    unplaced = np.maximum.accumulate(np.where(moved, number, -1), axis=0)
     uncertain = np.cumsum(anywhere)
     lost = np.cumsum(leaves_unknown(words, lengths) | anywhere)
     # A cycle that does not state R, G98, G99 and the frame ends as the one before it.
@@ -122,7 +122,7 @@ def cycle_ends(words: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
             at, drill = latest[row, axis[row]], drilled[axis[row]]
             there = level[drill] if drill > at else height[at, axis[row]]
             at, origin = max(at, drill), _level_from(words, row, cycle, source)
-            same = at > loose[row, axis[row]] and frame[at] == frame[row] and lost[at] == lost[row]
+            same = at > unplaced[row, axis[row]] and frame[at] == frame[row] and lost[at] == lost[row]
             at_r, before = np.nan, there if same else np.nan
         elif frame[row] != frame[last] or axis[row] != axis[last] or uncertain[row] != uncertain[last]:
             # LinuxCNC goes back to the number of the other axis

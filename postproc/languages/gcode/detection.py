@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 SUFFIXES = frozenset(
@@ -68,11 +67,3 @@ def is_sinumerik(path: Path, raw: bytes) -> bool:
     from postproc.languages.gcode import sinumerik  # takes its time to load
 
     return sinumerik.claims(path.suffix, raw)
-
-
-CLAIMS: dict[str, Callable[[Path, bytes], bool]] = {
-    "kuka_cnc": is_kuka_cnc,
-    "sinumerik": is_sinumerik,
-    "fanuc": is_fanuc,
-    "linuxcnc": is_gcode,
-}

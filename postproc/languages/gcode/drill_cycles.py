@@ -16,7 +16,7 @@ from postproc.languages.gcode.control import Group, Move
 from postproc.languages.gcode.cycle_ends import leaves_unknown
 from postproc.languages.gcode.execution_flow import FlowReason
 from postproc.languages.gcode.modal_fill import everywhere, switched
-from postproc.languages.gcode.motions import OWN, GcodeMotions
+from postproc.languages.gcode.motions import NOT_HIDDEN, GcodeMotions
 from postproc.languages.gcode.positions import Positions
 from postproc.languages.gcode.refusals import RefusalCollector
 from postproc.languages.gcode.words import How, key
@@ -41,7 +41,7 @@ WHY = (
     ("its depth is not below R", "check R and the depth"),
 )
 """Why the hole of a cycle is not the block's own, and what to do; the first: it is."""
-HIDDEN, DIFFERENCES, REPEATED, NO_DEPTH, NO_PLANE, ABOVE = range(OWN + 1, len(WHY))
+HIDDEN, DIFFERENCES, REPEATED, NO_DEPTH, NO_PLANE, ABOVE = range(NOT_HIDDEN + 1, len(WHY))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +88,9 @@ def drill_cycles(words: BlockWords, events: Ints, rebased: Bools, lengths: Bools
             ~(depth < plane),
         ],
         [HIDDEN, DIFFERENCES, REPEATED, NO_DEPTH, NO_PLANE, ABOVE],
-        OWN,
+        NOT_HIDDEN,
     )
-    own = why[rows] == OWN
+    own = why[rows] == NOT_HIDDEN
     result = DrillCycles(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, np.bool_), axis, why)
     result.depth[rows[own]], result.room[rows[own]] = depth[own], (plane - depth)[own]
     result.stated[rows] = stated
@@ -142,7 +142,7 @@ def with_holes(moves: GcodeMotions, holes: DrillCycles, where: Positions) -> Gco
     cycles = moves.move == Move.CYCLE
     if not cycles.any():
         return moves
-    hidden = np.where(cycles, holes.why[moves.block], OWN)
+    hidden = np.where(cycles, holes.why[moves.block], NOT_HIDDEN)
     at = np.flatnonzero(np.isfinite(holes.depth[moves.block]))
     block = moves.block[at]
     axis = holes.axis[block]
@@ -160,7 +160,7 @@ def with_holes(moves: GcodeMotions, holes: DrillCycles, where: Positions) -> Gco
 
 def refuse_cycles(moves: GcodeMotions, collector: RefusalCollector) -> None:
     """Refuses the canned cycles whose hole is not that of their block."""
-    for number in np.unique(moves.hidden[moves.hidden != OWN]).tolist():
+    for number in np.unique(moves.hidden[moves.hidden != NOT_HIDDEN]).tolist():
         why, what_to_do = WHY[number]
         collector.refuse(moves.hidden == number, "GCO008", f"the block is a canned cycle: {why}", what_to_do)
 

@@ -113,7 +113,7 @@ def uncertain_stretches(source: Source, entered: Bools | None = None) -> list[tu
             if goto is None:
                 continue
             labels = _labels(source) if labels is None else labels
-            ends = [labels.get(_label(name)) for name in goto.groups() if name]
+            ends = [labels.get(label_name(name)) for name in goto.groups() if name]
             if not ends or None in ends:
                 found.append((0, n))
             else:
@@ -132,9 +132,9 @@ def _labels(source: Source) -> dict[str, int]:
     known = np.isfinite(numbers.value)
     names = [f"{value:.0f}" for value in numbers.value[known].tolist()]
     labels = dict(zip(names, numbers.block[known].tolist(), strict=True))
-    return labels | {_label(note.text): note.block for note in source.notes if note.kind == "label"}
+    return labels | {label_name(note.text): note.block for note in source.notes if note.kind == "label"}
 
 
-def _label(name: str) -> str:
+def label_name(name: str) -> str:
     """A label in upper case, of a block number the digits: N0030 and 30 are 30."""
     return _ZEROS.sub("", name.upper())

@@ -58,8 +58,8 @@ class Feeds:
         turns[self._force[Group.SPINDLE][blocks] != 0] = np.nan
         own = self._given.words(key("F")).last(blocks)
         result = np.where(here == Feed.PER_TURN, rate * turns, rate)
-        timed = np.where(length > 0, length, np.nan) * np.where(own > 0, own, np.nan)
-        result = np.where(here == Feed.INVERSE_TIME, timed, result)
+        inverse_time = np.where(length > 0, length, np.nan) * np.where(own > 0, own, np.nan)
+        result = np.where(here == Feed.INVERSE_TIME, inverse_time, result)
         result[here < 0] = np.nan
         for group in (Group.OVERRIDE, Group.FEED_AXES):
             result[self._force[group][blocks] != 0] = np.nan

@@ -18,6 +18,8 @@ from postproc.languages.gcode.control import (
     Move,
     Once,
     ProgrammedFrame,
+    modal_codes,
+    named_codes,
 )
 from postproc.languages.gcode.kuka_cnc_lines import WEIGHTS, KukaCncLines
 from postproc.languages.gcode.words import key
@@ -73,23 +75,8 @@ _NAMED: tuple[tuple[Group, int, str], ...] = (
 )
 
 
-def _names() -> tuple[dict[bytes, tuple[float, ...]], dict[int, ModalCode]]:
-    names: dict[bytes, tuple[float, ...]] = {}
-    codes: dict[int, ModalCode] = {}
-    for group, value, said in _NAMED:
-        for name in said.split(","):
-            number = float(1000 + len(codes))
-            codes[round(number * 10)] = ModalCode(group, int(value))
-            names[name.encode()] = (number,)
-    return names, codes
-
-
-NAMED, _NAMED_CODES = _names()
-CODES: Mapping[int, ModalCode] = {
-    round(number * 10): ModalCode(group, int(value))
-    for group, value, numbers in _NUMBERED
-    for number in numbers
-} | _NAMED_CODES
+NAMED, _NAMED_CODES = named_codes(_NAMED, ",")
+CODES: Mapping[int, ModalCode] = modal_codes(_NUMBERED) | _NAMED_CODES
 
 _SYSTEM = re.compile(r"#\s*+CS\s*+(DEF|ON|OFF|ADD)?\s*+(ALL)?\s*+((?:\[[^\]]*+\]\s*+)*+)$")
 _IN_BRACKETS = re.compile(r"\[([^\]]*)")

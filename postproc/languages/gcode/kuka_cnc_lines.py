@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 
 from postproc.languages.gcode.control import LexedLine
-from postproc.languages.gcode.sinumerik_expression import (
-    assigned_end,
-    bracket_end,
-    constant,
-    expression_end,
-    is_open,
-)
+from postproc.languages.gcode.line_words import ADDRESS, LineWords
+from postproc.languages.gcode.sinumerik_expression import assigned_end, bracket_end
 from postproc.languages.gcode.words import How, key
 
 _HEAD = re.compile(rb"[ \t\x0b\x0c]*(?P<slash>/[ \t]*\d?[ \t]*)?(?:[Nn:][ \t]*\d+)?[ \t]*")
@@ -22,8 +16,6 @@ _FLOW = re.compile(
     rb"\$[ \t]*(IF|ENDIF|ELSE|ELSEIF|FOR|ENDFOR|WHILE|ENDWHILE|DO|ENDDO|GOTO|SWITCH|ENDSWITCH|CASE|BREAK|CONTINUE)",
     re.I,
 )
-_ADDRESS = re.compile(rb"([A-Za-z])([0-9]{0,3})[ \t]*=[ \t]*")
-_WORD = re.compile(rb"([A-Za-z])[ \t]*((?:[-+][ \t]*)?(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)", re.I)
 _NAME = re.compile(rb"[A-Za-z_][A-Za-z_.][A-Za-z0-9_.]*")
 _ASSIGNED = re.compile(rb"[ \t]*+=(?!=)[ \t]*+")
 _BRACKETS = re.compile(rb"\[[^\[\]]*+\]")
@@ -48,73 +40,57 @@ class KukaCncLines:
         self._names = names
 
     def __call__(self, text: bytes) -> LexedLine:
-        words: list[tuple[int, int, int, int, float, int]] = []
-        notes: list[tuple[str, str]] = []
-
-        def note(kind: str, text: bytes) -> None:
-            notes.append((kind, text.decode("latin-1")))
-
-        def word(at: int, address: int, start: int, stop: int, value: float, how: int) -> None:
-            words.append((at, address, start, stop, value, how))
-
         head = _HEAD.match(text)
         place = head.end() if head else 0
-        deleted = head is not None and head["slash"] is not None
-        while place < len(text):
-            if text[place] in b" \t\x0b\x0c":
-                place += 1
-                continue
-            command, flow = _COMMAND.match(text, place), _FLOW.match(text, place)
-            if command is not None:
-                self._command(text, place, command, word, note)
-                break
-            if flow is not None:
-                name = flow[1].upper()
-                kind = "close" if name.startswith(b"END") else "open"
-                if name in (b"ELSE", b"ELSEIF", b"CASE", b"BREAK", b"CONTINUE"):
-                    kind = "between"
-                note("jump" if b"GOTO" in text.upper() else kind, text[place:].strip().upper())
-                break
-            address, plain = _ADDRESS.match(text, place), _WORD.match(text, place)
-            if address is not None:
-                letter, index = address[1].decode().upper(), address[2]
-                if letter == "P" and index:
-                    note("assign", b"<" + address[0])
-                    place = assigned_end(text, address.end())
-                    continue
-                close = expression_end(text, address.end())
-                literal = text[address.end() : close].rstrip()
-                value = constant(literal)
-                how = How.UNREAD if math.isnan(value) else How.NUMBER
-                stop = address.end() + len(literal)
-                word(place, key(letter, int(index) if index else None), address.end(), stop, value, how)
-                place = max(close, address.end() + 1)
-            elif plain is not None:
-                value = constant(plain[2])
-                how = How.NUMBER if b"." in plain[2] else How.INTEGER
-                word(place, key(plain[1].decode().upper()), plain.start(2), plain.end(), value, how)
-                place = plain.end()
-            else:
-                place = self._rest(text, place, words, note)
-        if words and is_open(text):
-            note("unknown", text.strip())
-        return LexedLine(words, notes, deleted)
+        return _KukaCncLine(text, self._names).lexed(
+            None, place, head is not None and head["slash"] is not None
+        )
 
-    def _command(self, text: bytes, place: int, command, word, note) -> None:  # type: ignore[no-untyped-def]
+
+class _KukaCncLine(LineWords):
+    evaluated = False
+
+    def __init__(self, text: bytes, names: Mapping[bytes, tuple[float, ...]]) -> None:
+        super().__init__(text)
+        self.names = names
+
+    def token(self, place: int) -> int:
+        text = self.text
+        if (command := _COMMAND.match(text, place)) is not None:
+            self.command(place, command)
+            return len(text)
+        if (flow := _FLOW.match(text, place)) is not None:
+            name = flow[1].upper()
+            kind = "close" if name.startswith(b"END") else "open"
+            if name in (b"ELSE", b"ELSEIF", b"CASE", b"BREAK", b"CONTINUE"):
+                kind = "between"
+            self.note("jump" if b"GOTO" in text.upper() else kind, text[place:].strip().upper())
+            return len(text)
+        if (address := ADDRESS.match(text, place)) is not None:
+            letter, index = address[1].decode().upper(), address[2]
+            if letter == "P" and index:
+                self.note("assign", b"<" + address[0])
+                return assigned_end(text, address.end())
+            return self.expression_word(place, key(letter, int(index) if index else None), address.end())
+        end = self.plain_word(place)
+        return self.rest(place) if end is None else end
+
+    def command(self, place: int, command: re.Match[bytes]) -> None:
+        text, names = self.text, self.names
         name, second = command[1].upper(), command[2].upper()
         said = name + b" " + second if second else name
-        for number in self._names.get(said, self._names.get(name, ())):
-            word(place, key("G"), -1, len(text.rstrip()), number, How.INTEGER)
-        if said in self._names or name in self._names or name in QUIET:
-            if name == b"CS":
-                note("frame", text[place:].strip().upper())
-            elif _MOVES.search(_BRACKETS.sub(b" ", text[command.end() :])):
-                note("unknown", text[place:].strip())
-            return
-        note("call", text[place:].strip())
+        for number in names.get(said, names.get(name, ())):
+            self.word(place, key("G"), -1, len(text.rstrip()), number, How.INTEGER)
+        if said not in names and name not in names and name not in QUIET:
+            self.note("call", text[place:].strip())
+        elif name == b"CS":
+            self.note("frame", text[place:].strip().upper())
+        elif _MOVES.search(_BRACKETS.sub(b" ", text[command.end() :])):
+            self.note("unknown", text[place:].strip())
 
-    @staticmethod
-    def _rest(text: bytes, place: int, words: list[tuple[int, int, int, int, float, int]], note) -> int:  # type: ignore[no-untyped-def]
+    def rest(self, place: int) -> int:
+        """Reads what is no word; where it ends."""
+        text, words = self.text, self.words
         number = _NUMBER.match(text, place)
         if number is not None and words and words[-1][1] == key("G") and words[-1][4] in WEIGHTS:
             return number.end()
@@ -126,10 +102,10 @@ class KukaCncLines:
                 at = bracket_end(text, at)
             assigned = _ASSIGNED.match(text, at)
             if assigned is not None:
-                note("assign", b"<" + rest)
+                self.note("assign", b"<" + rest)
                 return max(assigned_end(text, assigned.end()), at + 1)
             quiet = name[0].upper() == b"WAIT"
-            note("assign" if quiet else "call", b"<" + rest if quiet else rest)
+            self.note("assign" if quiet else "call", b"<" + rest if quiet else rest)
         else:
-            note("unknown", rest)
+            self.note("unknown", rest)
         return len(text)

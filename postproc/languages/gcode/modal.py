@@ -149,8 +149,8 @@ def modal(execution: Execution, control: Control, base: int | None = None) -> Mo
         if one == Group.MOTION:
             force[one] = _moves(fill, blocks[own], values[own], control.cycle_apart)
         else:
-            some, meant = also.added(one, own, values)
-            force[one] = fill(blocks[some], meant[some])
+            some, assigned = also.added(one, own, values)
+            force[one] = fill(blocks[some], assigned[some])
     states, twice = _verbs(blocks, values, groups == Group.MOTION, n)
     quiet = states.astype(np.int8)
     for one in (Group.PLANE, Group.DISTANCE, Group.ARCS, Group.UNITS):
@@ -237,13 +237,13 @@ class _Also:
 
     def added(self, group: Group, own: Bools, values: Ints) -> tuple[Bools, Ints]:
         """Codes that say something of ``group``, and what."""
-        some, meant = own, values
+        some, assigned = own, values
         for rows, others in self._rows.values():
             for other in others:
                 if other.group == group:
-                    some, meant = (some.copy(), meant.copy()) if some is own else (some, meant)
-                    some[rows], meant[rows] = True, other.value
-        return some, meant
+                    some, assigned = (some.copy(), assigned.copy()) if some is own else (some, assigned)
+                    some[rows], assigned[rows] = True, other.value
+        return some, assigned
 
 
 def _offsets(

@@ -12,7 +12,7 @@ from postproc.languages.gcode.modal_fill import everywhere
 from postproc.languages.gcode.positions import Positions
 from postproc.languages.gcode.tool_orientation import ToolOrientation
 
-OWN = 0
+NOT_HIDDEN = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,5 +74,5 @@ class GcodeMotions:
             length,
             orientation,
             everywhere(np.nan, len(block)),
-            everywhere(OWN, len(block), np.int8),
+            everywhere(NOT_HIDDEN, len(block), np.int8),
         )

@@ -135,7 +135,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     frame_of_base, frame_of_tool, cell_frames = references(base, tool[rows], line, offset.stated)
     said = remarks(document, source, rows, execution.order is None, foreign)
     state = {name: found.take_column(name) for name in STATE}
-    timed = state["feed_mode"] == Feed.INVERSE_TIME
+    inverse_time = state["feed_mode"] == Feed.INVERSE_TIME
     drilled = found.take_column("drills")
     path = Toolpath(
         targets=Targets(
@@ -152,7 +152,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         speeds=MotionSpeeds(
             feed=found.take_column("feed"),
             spindle=shared(found.take_column("spindle")),
-            inverse_time_feed=timed if timed.any() else everywhere(False, len(rows)),
+            inverse_time_feed=inverse_time if inverse_time.any() else everywhere(False, len(rows)),
         ),
         sequence=MotionSequence(
             approximation=with_stops(found.take_column("blend"), given, rows),

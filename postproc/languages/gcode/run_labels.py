@@ -8,12 +8,11 @@ from collections import defaultdict
 
 import numpy as np
 
-from postproc.languages.gcode.execution_flow import program_starts
+from postproc.languages.gcode.execution_flow import label_name, program_starts
 from postproc.languages.gcode.source import Source
 from postproc.languages.gcode.statements import FlowStatement
 from postproc.languages.gcode.words import key
 
-_ZEROS = re.compile(r"^N?0*(?=\d)")
 _ARCHIVE = re.compile(r"_N_(\w+?)_(?:MPF|SPF)", re.I)
 
 
@@ -42,7 +41,7 @@ class RunLabels:
             self._blocks[f"{value:.0f}"].append(block)
         for note in source.notes:
             if note.kind == "label":
-                self._blocks[_label(note.text)].append(note.block)
+                self._blocks[label_name(note.text)].append(note.block)
         self._programs: defaultdict[str, list[int]] = defaultdict(list)
         plain = source.column(key("O"))
         for value, block in zip(plain.value.tolist(), plain.block.tolist(), strict=True):
@@ -51,7 +50,7 @@ class RunLabels:
             if note.kind == "program":
                 archive = _ARCHIVE.fullmatch(note.text)
                 name = archive[1] if archive else note.text.lstrip(": \t").strip()
-                self._programs[_label(name)].append(note.block)
+                self._programs[label_name(name)].append(note.block)
 
     def part_of(self, block: int) -> tuple[int, int]:
         """First block of the program that a block is in, and the one after its last."""
@@ -62,7 +61,7 @@ class RunLabels:
     def find(self, statement: FlowStatement, block: int) -> int | None:
         """The block that a jump from ``block`` leads to; None where that is not certain."""
         start, stop = self.part_of(block)
-        places = self._blocks.get(_label(statement.label), [])
+        places = self._blocks.get(label_name(statement.label), [])
         inside = places[bisect_left(places, start) : bisect_left(places, stop)]
         if len(inside) != 1:
             return None
@@ -77,7 +76,7 @@ class RunLabels:
 
     def program(self, name: str) -> tuple[int, int] | None:
         """First block and the one after the last of a program of the file."""
-        places = self._programs.get(_label(name), [])
+        places = self._programs.get(label_name(name), [])
         if len(places) != 1:
             return None
         start, stop = places[0], self.part_of(places[0])[1]
@@ -91,8 +90,3 @@ class RunLabels:
         """Where what is repeated from ``start`` up to ``stop`` ends: at an ENDLABEL, if there is one."""
         ends = [block for block in self._blocks.get("ENDLABEL", []) if start < block < stop]
         return ends[0] if ends else stop
-
-
-def _label(name: str) -> str:
-    """A label in capitals, of a block number the digits: N0030 and 30 are 30."""
-    return _ZEROS.sub("", name.upper())

@@ -20,6 +20,8 @@ from postproc.languages.gcode.control import (
     Move,
     Once,
     ProgrammedFrame,
+    modal_codes,
+    named_codes,
 )
 from postproc.languages.gcode.offsets import start
 from postproc.languages.gcode.sinumerik_expression import constant
@@ -30,9 +32,6 @@ COMMENT = rb'("[^"\r\n]*"?)|;[^\r\n]*'
 
 BEGIN = 65536
 """Bytes from the start of a file that are searched for the control that it is for."""
-
-FIRST_NAME = 1000
-"""Codes of names are numbers from here on."""
 
 _NUMBERED: tuple[tuple[Group, int, tuple[float, ...]], ...] = (
     (Group.MOTION, Move.RAPID, (0,)),
@@ -142,24 +141,8 @@ _NAMED: tuple[tuple[Group, int, str], ...] = (
 )
 
 
-def _names() -> tuple[dict[bytes, tuple[float, ...]], dict[int, ModalCode]]:
-    """Name -> the numbers of its codes, and those codes."""
-    names: dict[bytes, tuple[float, ...]] = {}
-    codes: dict[int, ModalCode] = {}
-    for group, value, said in _NAMED:
-        for name in said.split():
-            number = float(FIRST_NAME + len(codes))
-            codes[round(number * 10)] = ModalCode(group, int(value))
-            names[name.encode()] = (*names.get(name.encode(), ()), number)
-    return names, codes
-
-
-NAMED, _NAMED_CODES = _names()
-CODES: Mapping[int, ModalCode] = {
-    round(number * 10): ModalCode(group, int(value))
-    for group, value, numbers in _NUMBERED
-    for number in numbers
-} | _NAMED_CODES
+NAMED, _NAMED_CODES = named_codes(_NAMED)
+CODES: Mapping[int, ModalCode] = modal_codes(_NUMBERED) | _NAMED_CODES
 
 _FRAMES = {
     NAMED[name.encode()][0]: name

@@ -5,20 +5,27 @@ from __future__ import annotations
 import math
 import re
 
-_NUMBER = re.compile(rb"[ \t]*((?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)[ \t]*", re.I)
+from postproc.languages.gcode.expression_values import SINUMERIK, evaluate
+
+_CONSTANT = re.compile(rb"(?:[-+*/(). \t0-9]|(?<=[.0-9])EX)++", re.I)
 _OPERAND = re.compile(rb"'[^']*'|[0-9.]+(?:EX[-+]?[0-9]+)?|[$A-Za-z_][$A-Za-z0-9_]*", re.I)
 _OPERATOR = re.compile(rb"[ \t]*+(?:MOD|DIV|AND|OR|XOR|NOT|B_[A-Z]+)(?![A-Za-z_0-9])|[ \t]*+[-+*/<>=]", re.I)
 _CLOSED = re.compile(rb'"[^"]*"')
-_DEEPEST = 20
 _LONGEST = 200
 
 
 def constant(text: bytes) -> float:
     """The value of an expression; NaN where it is no constant that is read here, or is not finite."""
-    if len(text) > _LONGEST:
+    if len(text) > _LONGEST or not _CONSTANT.fullmatch(text):
         return math.nan
-    value, end = _sum(text, 0, 0)
-    return value if end == len(text) and math.isfinite(value) else math.nan
+    try:
+        return float(text)
+    except ValueError:
+        return evaluate(text.decode("latin-1"), SINUMERIK, _unknown)
+
+
+def _unknown(name: str) -> float:
+    return math.nan
 
 
 def expression_end(text: bytes, at: int) -> int:
@@ -73,44 +80,3 @@ def bracket_end(text: bytes, at: int) -> int:
         if depth == 0:
             return place + 1
     return len(text)
-
-
-def _sum(text: bytes, at: int, depth: int) -> tuple[float, int]:
-    value, at = _product(text, at, depth)
-    while text[at : at + 1] in (b"+", b"-"):
-        sign = 1.0 if text[at : at + 1] == b"+" else -1.0
-        other, at = _product(text, at + 1, depth)
-        value += sign * other
-    return value, at
-
-
-def _product(text: bytes, at: int, depth: int) -> tuple[float, int]:
-    value, at = _factor(text, at, depth)
-    while text[at : at + 1] in (b"*", b"/"):
-        divide = text[at : at + 1] == b"/"
-        other, at = _factor(text, at + 1, depth)
-        value = math.nan if divide and other == 0.0 else value / other if divide else value * other
-    return value, at
-
-
-def _factor(text: bytes, at: int, depth: int) -> tuple[float, int]:
-    while text[at : at + 1] in (b" ", b"\t"):
-        at += 1
-    if text[at : at + 1] in (b"+", b"-") and depth < _DEEPEST:
-        value, end = _factor(text, at + 1, depth + 1)
-        return (-value if text[at : at + 1] == b"-" else value), end
-    if text[at : at + 1] == b"(" and depth < _DEEPEST:
-        value, end = _sum(text, at + 1, depth + 1)
-        if text[end : end + 1] != b")":
-            return math.nan, end
-        end += 1
-        while text[end : end + 1] in (b" ", b"\t"):
-            end += 1
-        return value, end
-    found = _NUMBER.match(text, at)
-    if found is None:
-        return math.nan, at
-    try:
-        return float(found[1].upper().replace(b"EX", b"E")), found.end()
-    except (ValueError, OverflowError):
-        return math.nan, found.end()

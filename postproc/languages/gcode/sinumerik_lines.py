@@ -7,12 +7,12 @@ import re
 from collections.abc import Mapping
 
 from postproc.languages.gcode.control import LexedLine
+from postproc.languages.gcode.line_words import ADDRESS, LineWords
 from postproc.languages.gcode.sinumerik_expression import (
     assigned_end,
     bracket_end,
     constant,
     expression_end,
-    is_open,
 )
 from postproc.languages.gcode.words import NAMES, How, key, value_note
 
@@ -69,9 +69,6 @@ _HEAD = re.compile(
 )
 _LABEL = re.compile(rb"([A-Za-z_][A-Za-z0-9_]+)[ \t]*:(?!=)")
 _NAME = re.compile(rb"[A-Za-z_$][A-Za-z_$][A-Za-z0-9_$]*")
-_ADDRESS = re.compile(rb"([A-Za-z])([0-9]{0,3})[ \t]*=[ \t]*")
-_NUMBER = rb"(?:[-+][ \t]*)?(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?"
-_WORD = re.compile(rb"([A-Za-z])[ \t]*(" + _NUMBER + rb")", re.I)
 _ASSIGNED = re.compile(rb"[ \t]*=(?!=)[ \t]*")
 _INDEX = re.compile(rb"[ \t]*\[")
 _PROGRAM = re.compile(rb"[ \t]*%[ \t]*([A-Za-z0-9_]*)")
@@ -97,14 +94,12 @@ class SinumerikLines:
         return _SinumerikLine(text, self._names, self._tools).line()
 
 
-class _SinumerikLine:
+class _SinumerikLine(LineWords):
     def __init__(
         self, text: bytes, names: Mapping[bytes, tuple[float, ...]], tools: Mapping[bytes, int]
     ) -> None:
-        self.text, self.names, self.tools = text, names, tools
-        self.words: list[tuple[int, int, int, int, float, int]] = []
-        self.notes: list[tuple[str, str]] = []
-        self.deleted = False
+        super().__init__(text)
+        self.names, self.tools = names, tools
 
     def line(self) -> LexedLine:
         program = _PROGRAM.match(self.text)
@@ -113,34 +108,20 @@ class _SinumerikLine:
             return LexedLine([], self.notes, False)
         head = _HEAD.match(self.text)
         place = head.end() if head else 0
-        self.deleted = head is not None and bool(head["slash"] or head["slash2"])
+        deleted = head is not None and bool(head["slash"] or head["slash2"])
         label = _LABEL.match(self.text, place)
         if label is not None:
             self.note("label", label[1].upper())
             place = label.end()
-        while place < len(self.text):
-            if self.text[place] in b" \t\x0b\x0c":
-                place += 1
-                continue
-            place = self.token(place)
-        if self.words and is_open(self.text):
-            self.note("unknown", self.text[head.end() if head else 0 :].strip())
-        return LexedLine(self.words, self.notes, self.deleted)
-
-    def note(self, kind: str, text: bytes) -> None:
-        self.notes.append((kind, text.decode("latin-1")))
-
-    def word(self, at: int, address: int, start: int, stop: int, value: float, how: int) -> None:
-        self.words.append((at, address, start, stop, value, how))
+        return self.lexed(head, place, deleted)
 
     def codes(self, at: int, stop: int, name: bytes) -> None:
         for number in self.names[name]:
             self.word(at, key("G"), -1, stop, number, How.INTEGER)
 
     def token(self, place: int) -> int:
-        """Reads what starts at ``place``; where it ends."""
         text = self.text
-        address = _ADDRESS.match(text, place)
+        address = ADDRESS.match(text, place)
         if address is not None:
             letter, index = address[1].upper(), address[2]
             if letter == b"R" and index:
@@ -155,13 +136,9 @@ class _SinumerikLine:
         name = _NAME.match(text, place)
         if name is not None:
             return self.name(name[0].upper(), place, name.end())
-        plain = _WORD.match(text, place)
-        if plain is not None:
-            start, literal = plain.start(2), plain[2]
-            value = constant(literal)
-            how = How.NUMBER if b"." in literal else How.INTEGER
-            self.word(place, key(plain[1].decode().upper()), start, plain.end(), value, how)
-            return plain.end()
+        end = self.plain_word(place)
+        if end is not None:
+            return end
         self.note("unknown", text[place:].strip())
         return len(text)
 
@@ -188,15 +165,7 @@ class _SinumerikLine:
                 kind = How.UNREAD
             self.word(place, address, start, stop, number, kind)
             return close
-        close = expression_end(text, at)
-        literal = text[at:close].rstrip()
-        number = constant(literal)
-        if math.isnan(number):
-            self.note("value", value_note(self.words, address, How.NUMBER, literal))
-        self.word(
-            place, address, at, at + len(literal), number, How.UNREAD if math.isnan(number) else How.NUMBER
-        )
-        return max(close, at + 1)
+        return self.expression_word(place, address, at)
 
     def name(self, name: bytes, place: int, end: int) -> int:
         text = self.text

@@ -13,10 +13,11 @@ from functools import cached_property
 import numpy as np
 
 from postproc.base.array_storage import GrowingColumns
-from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints, sums
+from postproc.base.batches import in_blocks
 from postproc.languages.gcode.control import Control
 from postproc.languages.gcode.lexing import lex
-from postproc.languages.gcode.words import Note, key
+from postproc.languages.gcode.words import Note, Text, key
 
 SIZE = 1 << 18
 """Bytes that are lexed at a time."""
@@ -140,9 +141,15 @@ def scan(raw: bytes, control: Control) -> Source:
     lines = GrowingColumns(np.int32, np.int32, np.int32, np.int32, np.bool_, np.bool_)
     comments = GrowingColumns(np.int32)
     notes: list[Note] = []
-    blocks, line = 0, 1
-    for start, end in _pieces(raw):
-        text = lex(raw, control, start, end, line)
+    pieces = list(_pieces(raw))
+    first = sums(np.array([raw.count(b"\n", *piece) for piece in pieces])).tolist()
+    blocks = 0
+
+    def lexed(part: slice) -> Text:
+        start, end = pieces[part.start]
+        return lex(raw, control, start, end, 1 + first[part.start])
+
+    for text in in_blocks(lexed, len(pieces), 1):
         for one in np.flatnonzero(np.bincount(text.words.key)).tolist():
             rows = np.flatnonzero(text.words.key == one)
             column = words.setdefault(one, GrowingColumns(np.int32, np.float64, np.int8))
@@ -156,7 +163,6 @@ def scan(raw: bytes, control: Control) -> Source:
         )
         comments.add(text.comments.reshape(-1))
         blocks += len(here)
-        line += raw.count(b"\n", start, end)
     columns = {one: WordColumn(*column.done()) for one, column in sorted(words.items())}
     return Source(columns, SourceLines(*lines.done()), tuple(notes), next(comments.done()).reshape(-1, 3))
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Ints
 from postproc.base.document import Document
-from postproc.base.read_files import list_folder, note_absent, note_listing, read_file
+from postproc.base.read_files import note_absent, note_listing
+from postproc.languages.core.sibling_files import document_of, files_in
 from postproc.languages.dialect import Program, ReadingSettings
 from postproc.languages.gcode.control import Control
 from postproc.languages.gcode.correctability import POSITION
@@ -44,16 +45,15 @@ def find(program: Program, settings: ReadingSettings, beside: Path | None = None
     if not wanted:
         return ()
     folder = beside or program.documents[0].path.parent
-    try:
-        files = [one for one in list_folder(folder) if file_name(one) in wanted and one.is_file()]
-    except FileNotFoundError:
+    files = files_in(folder, lambda one: file_name(one) in wanted)
+    if files is None:
         return ()
     note_listing(folder, "")
     found = []
     for name in sorted(wanted):
         mine = [one for one in files if file_name(one) == name and one.name != program.documents[0].path.name]
         if len(mine) == 1:
-            found.append(Document(mine[0], read_file(mine[0])))
+            found.append(document_of(mine[0]))
         elif not mine:
             note_absent(folder / name)
     if sum(len(one.raw) for one in (*found, *settings.siblings)) > MOST_BYTES:

@@ -8,10 +8,12 @@ from itertools import pairwise
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints, differs
+from postproc.base.batches import in_blocks
 from postproc.base.decimals import fixed
 from postproc.base.document import Edits
 from postproc.base.findings import Finding
 from postproc.base.geometry import lengths
+from postproc.languages.core.plan_rows import refuse_divided, refuse_moved
 from postproc.languages.dialect import EditedTargets, Plan, Program, Role, WritingSettings
 from postproc.languages.gcode.control import Move
 from postproc.languages.gcode.source_map import SourceMapPart
@@ -49,11 +51,13 @@ def edit_targets(program: Program, plan: Plan, writing: WritingSettings) -> Edit
     held: dict[int, str] = {}
     edits: list[Edits] = []
     ends = Ends(np.full(3, np.nan), np.full(3, np.nan))
-    for start in range(0, len(path), ROWS):
-        motions = WrittenMotions.of(
-            program, plan, writing, start, min(start + ROWS, len(path)), forbidden.rows
-        )
-        forbidden.check(motions, start)
+
+    def gathered(rows: slice) -> WrittenMotions:
+        motions = WrittenMotions.of(program, plan, writing, rows.start, rows.stop, forbidden.rows)
+        forbidden.check(motions, rows.start)
+        return motions
+
+    for motions in in_blocks(gathered, len(path), ROWS):  # only what is written depends on what is before
         written, bad, ends = _written(style, motions, ends)
         held |= {row + motions.first: code for row, code in bad.items()}
         edits.append(written)
@@ -116,13 +120,9 @@ class _Forbidden:
         path = motions.path
         shifted = differs(motions.plan.position[own], path.position[rows]).any(axis=1)
         shifted |= differs(motions.plan.rotation[own], path.rotation[rows]).any(axis=(1, 2))
-        kept = np.flatnonzero(shifted & self.still[rows + motions.first]) + start
-        if len(kept):
-            raise ValueError(f"motions that cannot be corrected are moved: rows {kept[:5].tolist()}")
+        refuse_moved((np.flatnonzero(shifted & self.still[rows + motions.first]) + start).tolist())
         rows = motions.row[~own] + motions.first
-        divided = np.unique(rows[self.whole[rows]])
-        if len(divided):
-            raise ValueError(f"motions that cannot be divided are divided: rows {divided[:5].tolist()}")
+        refuse_divided(np.unique(rows[self.whole[rows]]).tolist())
 
 
 @dataclass(frozen=True, eq=False)

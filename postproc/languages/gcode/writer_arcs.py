@@ -173,9 +173,9 @@ def _missed(arcs: ArcsToWrite, number: Floats, through: Bools, by_radius: Bools)
     worst = np.zeros(count)
     for share in (0.25, 0.5, 0.75):
         at = np.full(count, share)
-        meant = on_arc(arcs.start, arcs.end, arcs.centre, arcs.normal, arcs.sweep, at)
+        intended = on_arc(arcs.start, arcs.end, arcs.centre, arcs.normal, arcs.sweep, at)
         read = on_arc(arcs.start, arcs.end, centre, normal, sweep, at)
-        worst = np.maximum(worst, np.linalg.norm(meant - read, axis=1))
+        worst = np.maximum(worst, np.linalg.norm(intended - read, axis=1))
     worst[~(np.abs(sweep - arcs.sweep) < np.pi)] = np.nan
     unequal = np.abs(_distance(arcs, arcs.start, stated) - _distance(arcs, arcs.end, stated))
     return worst / step, np.where(through | by_radius, 0.0, unequal / step)

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from postproc.base.document import Document, Edit
 from postproc.base.findings import Finding, Refusal
-from postproc.base.read_files import list_folder
+from postproc.languages.core.dialect_defaults import DialectDefaults
+from postproc.languages.core.sibling_files import files_in
 from postproc.languages.dialect import (
-    MARK,
     PLAIN,
     DialectOption,
     EditedTargets,
@@ -17,7 +17,6 @@ from postproc.languages.dialect import (
     Program,
     ReadingSettings,
     WritingSettings,
-    put_mark,
 )
 from postproc.languages.krl import codes as codes
 
@@ -33,11 +32,12 @@ _CLAIM = re.compile(
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,23}")
 
 
-class KrlDialect:
+class KrlDialect(DialectDefaults):
     """KRL as a ``Dialect``."""
 
     name = "krl"
     family = "KRL"
+    comment = ";"
     letters = b"ABCDEFGHIJKLMNOPQRSTUVWXYZ"  # points have names
     companion_suffixes: tuple[str, ...] = (".dat",)
     suffixes: tuple[str, ...] = (".src", ".sub")
@@ -47,11 +47,7 @@ class KrlDialect:
 
     def companions(self, path: Path) -> list[Path]:
         wanted = {(path.stem.lower(), suffix) for suffix in self.companion_suffixes}
-        try:
-            beside = list_folder(path.parent)
-        except FileNotFoundError:
-            return []
-        matches = [p for p in beside if (p.stem.lower(), p.suffix.lower()) in wanted and p.is_file()]
+        matches = files_in(path.parent, lambda p: (p.stem.lower(), p.suffix.lower()) in wanted) or []
         # Where several differ by case only, the one spelt as the program is.
         return sorted(matches, key=lambda p: p.stem != path.stem)[:1]
 
@@ -81,9 +77,6 @@ class KrlDialect:
         from postproc.languages.krl import writer
 
         return writer.edit_targets(program, plan, writing)
-
-    def marked(self, program: Program, text: str) -> Edit:
-        return put_mark(program, f";{MARK}{text}".encode("latin-1", "replace"))
 
     def renamed(self, program: Program, stem: str) -> list[Edit]:
         """Edits that call the program ``stem``.  Raises Refusal (FIL011) where that cannot name a module."""

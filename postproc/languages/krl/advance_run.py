@@ -10,9 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from postproc.base.arrays import Bools
+from postproc.languages.core.motion_sources import Source
 from postproc.languages.core.waits import Waits
 from postproc.languages.krl.lexing import Assignment, Call, Statement, StatementKind, cached, identifiers
-from postproc.languages.krl.modal_state import NAN, Source
+from postproc.languages.krl.modal_state import NAN
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.predecessors import expanded
 from postproc.languages.krl.statement_effects import READS_POSITION, SYSTEM, bas

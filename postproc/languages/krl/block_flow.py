@@ -5,15 +5,16 @@ from __future__ import annotations
 import re
 from abc import abstractmethod
 
+from postproc.languages.core.motion_sources import ELSEWHERE, together
 from postproc.languages.krl.assignments import with_clause
 from postproc.languages.krl.execution_context import Flow, SplineBlock
 from postproc.languages.krl.expressions import Value
 from postproc.languages.krl.flow_frames import BlockFrame
 from postproc.languages.krl.lexing import NAME, SPLINES, Statement, cached, identifiers, is_integer, value_end
-from postproc.languages.krl.modal_state import ELSEWHERE
+from postproc.languages.krl.modal_state import ModalState
 from postproc.languages.krl.open_blocks import BUDGET, OpenBlocks
 from postproc.languages.krl.program_blocks import Block
-from postproc.languages.krl.statement_effects import EVERYTHING, MODAL
+from postproc.languages.krl.statement_effects import EVERYTHING, MODAL, Effect
 from postproc.languages.krl.target import UnknownValue
 
 AFTER_FOR = UnknownValue("KRL002", "the value of a counter after its FOR is not documented")
@@ -37,6 +38,23 @@ def _head_of_for(code: bytes) -> tuple[bytes, tuple[bytes, ...], tuple[Value, ..
     texts = tuple(text.strip() for text in (found[2], found[3], found[4] or b"1"))
     plain = all(text.isdigit() and len(text) < 19 for text in texts)
     return found[1].upper(), texts, tuple(map(int, texts)) if plain else ()
+
+
+_SET_BY_WITH: dict[str, Effect] = {
+    "base": "base", "tool": "tool", "feed": "feed", "blend": "apo", "tool_known": "mode", "orientation": "turning",
+    "arc_frame": "turning",
+}  # fmt: skip
+"""What a WITH sets, and the effect of what changes it."""
+
+
+def _changed_since(opened: ModalState, state: ModalState) -> set[Effect]:
+    """What statements of a spline, or functions that it calls, have changed since its WITH: it stays changed."""
+    return {
+        effect
+        for name, effect in _SET_BY_WITH.items()
+        if (now := getattr(state, name)) != (before := getattr(opened, name))
+        and not (now != now and before != before)
+    }
 
 
 class BlockFlow(OpenBlocks):
@@ -67,7 +85,6 @@ class BlockFlow(OpenBlocks):
         long = self.steps > self.most_steps or block.end - block.start > BUDGET
         if frame.head is not None and long:
             frame.head = self._forgotten(frame.head, block)
-        frame.mark = run.rows.new_mark()
         return self._enter_pass(frame, item)
 
     def _open_spline(self, item: Statement, block: Block) -> None:
@@ -76,6 +93,7 @@ class BlockFlow(OpenBlocks):
         clause = _WITH.search(item.code)
         if self.reachable and clause and with_clause(run, item, clause[1]) is not None:
             run.forget({"base", "tool"}, f"in the spline of line {block.line}: its WITH is not understood")
+        frame.opened = run.state.copy()
         enters = block.word == b"SPLINE" and not run.state.no_insert
         run.spline = SplineBlock(block.line, frame.checkpoint.counts[0], enters)
 
@@ -193,10 +211,10 @@ class BlockFlow(OpenBlocks):
         self._continue_with(frame.head)
         frame.exits = None
         if frame.before is not None:
-            run.rows.sources[frame.mark] = set(frame.before.state.sources)
+            frame.meeting.sources = set(frame.before.state.sources)
         if frame.head is None:
             return block.start + 1
-        run.state.sources = frozenset([frame.mark])
+        run.state.sources = frozenset([frame.meeting])
         if block.word == b"WHILE":
             value = run.value(item.code[5:])
             if value is not True:
@@ -283,7 +301,7 @@ class BlockFlow(OpenBlocks):
             self.reachable = True
             self.run.forget(EVERYTHING, f"after line {frame.block.line}, whose block is not understood")
             self.run.state.form = None
-        self.run.state.sources = self.run.rows.joined(sources | self.run.state.sources)
+        self.run.state.sources = together(sources | self.run.state.sources)
 
     def _leave_loop(self, frame: BlockFrame) -> None:
         """After the last pass of a loop that is followed."""
@@ -310,7 +328,7 @@ class BlockFlow(OpenBlocks):
                 self._call_functions(self._item(block.start))
             if again is not False:
                 back = run.flow()
-                run.rows.sources[frame.mark] |= back.state.sources
+                frame.meeting.sources |= back.state.sources
                 head = back if frame.head is None else run.raised(frame.head, back)
                 if head is not frame.head:
                     if self.steps > self.most_steps:
@@ -343,10 +361,12 @@ class BlockFlow(OpenBlocks):
             run.forget({*MODAL, "point"}, f"after the spline of line {frame.block.line}")
             return
         state = run.state
-        frames = (state.base, state.tool)
+        frames, changed = (state.base, state.tool), _changed_since(frame.opened or entry, state)
         state.base, state.tool, state.feed = entry.base, entry.tool, entry.feed
         state.blend, state.tool_known = entry.blend, entry.tool_known
         state.orientation, state.arc_frame = entry.orientation, entry.arc_frame
+        if changed:
+            run.forget(changed, f"after the spline of line {frame.block.line}, in which it is changed")
         if len(run.rows) > first:
             if frames != (state.base, state.tool):
                 state.lose_point(f"after the spline of line {frame.block.line}")

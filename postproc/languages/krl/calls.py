@@ -7,6 +7,7 @@ from abc import abstractmethod
 from collections.abc import Set
 from functools import lru_cache
 
+from postproc.languages.core.motion_sources import ELSEWHERE, Meeting, together
 from postproc.languages.core.waits import Waits
 from postproc.languages.krl.assignments import command, keep
 from postproc.languages.krl.block_flow import BlockFlow
@@ -15,7 +16,7 @@ from postproc.languages.krl.external_axes import apart
 from postproc.languages.krl.flow_frames import BlockFrame, LabelHead, Restart
 from postproc.languages.krl.later_changes import EVENTS
 from postproc.languages.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, split_values
-from postproc.languages.krl.modal_state import ELSEWHERE, TRIGGERED, ModalState
+from postproc.languages.krl.modal_state import TRIGGERED, ModalState
 from postproc.languages.krl.other_modules import RoutineExit, take_exit
 from postproc.languages.krl.program_blocks import Routine
 from postproc.languages.krl.program_structure import MOST_EFFECTS, callers, closure
@@ -73,17 +74,17 @@ class Calls(BlockFlow):
             active.waiting = active.waiting.set(name, None)
         self._continue_with(flow)
         if run.structure.jumps.get(key, (-1, -1))[1] > pc:
-            head = LabelHead(flow, flow, self._checkpoint(copies=True), run.rows.new_mark())
+            head = LabelHead(flow, flow, self._checkpoint(copies=True), Meeting())
             active.heads = active.heads.set(name, head)
             self._start_at(head)
 
     def _lose_all(self, item: Statement, name: bytes, key: tuple[int, bytes]) -> None:
         """After a label to which jumps lead that are not followed."""
-        run, mark = self.run, b"label %d " % key[0] + name
+        run, meeting = self.run, self.run.rows.label(*key)
         self.reachable = True
         run.forget(EVERYTHING, f"after the label {shown(name)} in line {item.line}")
-        run.rows.sources[mark] |= run.state.sources
-        run.state.sources = frozenset([mark])
+        meeting.sources |= run.state.sources
+        run.state.sources = frozenset([meeting])
         run.state.form = None
         run.add_finding(
             "KRL024", f"the jumps to {shown(name)} are not followed: from here on nothing is known", item
@@ -91,11 +92,10 @@ class Calls(BlockFlow):
 
     def _start_at(self, head: LabelHead) -> None:
         """Goes on after a label with what holds there."""
-        sources = self.run.rows.sources
-        sources[head.mark] = set() if head.entry is None else set(head.entry.state.sources)
+        head.meeting.sources = set() if head.entry is None else set(head.entry.state.sources)
         self._continue_with(head.flow)
         if head.flow is not None:
-            self.run.state.sources = frozenset([head.mark])
+            self.run.state.sources = frozenset([head.meeting])
 
     def _goto(self, pc: int, name: bytes) -> int:
         run, routine = self.run, self.run.routine
@@ -115,7 +115,7 @@ class Calls(BlockFlow):
             run.spline = None
             return at
         if key in self.unfollowed.labels:
-            run.rows.sources[b"label %d " % routine.start + name] |= run.state.sources
+            run.rows.label(*key).sources |= run.state.sources
             self.reachable = False
             return pc + 1
         left = next(
@@ -139,7 +139,7 @@ class Calls(BlockFlow):
         if head is None:
             self.unfollowed.labels.add(key)
             raise Restart
-        run.rows.sources[head.mark] |= flow.state.sources
+        head.meeting.sources |= flow.state.sources
         raised = flow if head.flow is None else run.raised(head.flow, flow)
         if raised is head.flow:
             self.reachable = False
@@ -147,7 +147,7 @@ class Calls(BlockFlow):
         if self.steps > self.most_steps:
             raised = self._forgotten(raised, routine)
         self._return_to(head.checkpoint)
-        head = LabelHead(raised, head.entry, head.checkpoint, head.mark)
+        head = LabelHead(raised, head.entry, head.checkpoint, head.meeting)
         self.activations[-1].heads = self.activations[-1].heads.set(name, head)
         self._start_at(head)
         return routine.labels[name][0] + 1
@@ -227,11 +227,11 @@ class Calls(BlockFlow):
         """After a call that an interrupt may have ended, after any of the rows from ``first`` on."""
         run = self.run
         run.forget({"point", *effects}, why)
-        mark = run.rows.new_mark()
-        run.rows.sources[mark] = {*run.state.sources, ELSEWHERE}
+        meeting = Meeting()
+        meeting.sources |= {*run.state.sources, ELSEWHERE}
         if first >= 0:
-            run.rows.sources[mark].update(range(first, len(run.rows)))
-        run.state.sources = frozenset([mark])
+            meeting.sources.update(range(first, len(run.rows)))
+        run.state.sources = frozenset([meeting])
 
     def _call(self, pc: int, item: Statement, call: Call) -> int:
         run = self.run
@@ -342,11 +342,10 @@ class Calls(BlockFlow):
         if not is_harmless(name):
             run.state.stop = max(run.state.stop, Waits.MAYBE)
         if routine is not None:
-            mark = b"routine %d" % routine.line
-            run.rows.sources[mark] |= run.state.sources
+            run.rows.meetings[b"routine %d" % routine.line].sources |= run.state.sources
             self.text_called.add(name)
             if "point" in routine.effects:
-                run.state.sources = run.rows.joined(run.state.sources | {ELSEWHERE})
+                run.state.sources = together(run.state.sources | {ELSEWHERE})
             run.forget(routine.effects | words, why)
             if run.state.ended_later:
                 self._end_anywhere(set(), why)
@@ -418,7 +417,7 @@ class Calls(BlockFlow):
         run = self.run
         effects = run.effects_of_others[name]
         if "point" in effects:
-            run.state.sources = run.rows.joined(run.state.sources | {ELSEWHERE})
+            run.state.sources = together(run.state.sources | {ELSEWHERE})
         run.forget(effects | words, f"after the call of {shown(name)} in line {item.line}")
         self._note_other(item, name)
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from postproc.base.document import Document
 from postproc.base.findings import Finding
+from postproc.languages.core.motion_sources import together
 from postproc.languages.krl.data import Declarations
 from postproc.languages.krl.expressions import Value, decided_by_digits, evaluate
 from postproc.languages.krl.lexing import FRAME_TABLES, Statement
@@ -247,7 +248,7 @@ class ExecutionContext:
         """What holds where two paths meet; None for a path that nothing takes."""
         if one is None or other is None:
             return one or other
-        sources = self.rows.joined(one.state.sources | other.state.sources)
+        sources = together(one.state.sources | other.state.sources)
         state = joined(one.state, other.state).changed(sources=sources)
         return Flow(state, self.variables.joined(one.variables, other.variables))
 

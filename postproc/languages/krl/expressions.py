@@ -35,11 +35,16 @@ TOKEN = re.compile(
 _NAME = re.compile(NAME + rb"\Z")
 _PART = re.compile(rb"(" + NAME + rb")((?:\[\d{1,18}+\])?+(?:\." + NAME + rb")?+)\Z")
 """A component or an element with an index of digits: most of what is no number and no name."""
+_COUNTED = re.compile(rb"(" + NAME + rb")[ \t]*+(==|<>|<=|>=|[-+*<>])[ \t]*+(\d{1,15})[ \t]*+\Z")
+"""A variable and a whole number: most of what loops and branches compute and compare."""
 LAST_DIGITS = 1e-6
 """Of a REAL or of 1: a REAL has 32 bits on the controller, so what is nearer may be the same there, or not."""
 _COMPARISONS = {
     b"==": lambda a, b: a == b, b"<>": lambda a, b: a != b, b"<": lambda a, b: a < b,
     b">": lambda a, b: a > b, b"<=": lambda a, b: a <= b, b">=": lambda a, b: a >= b,
+}  # fmt: skip
+_WHOLE: dict[bytes, Callable[[int, int], int]] = {
+    **_COMPARISONS, b"+": lambda a, b: a + b, b"-": lambda a, b: a - b, b"*": lambda a, b: a * b,
 }  # fmt: skip
 _LOGIC = (
     {b"OR": lambda a, b: a or b, b"B_OR": lambda a, b: a | b},
@@ -59,6 +64,10 @@ _FUNCTIONS: dict[bytes, Callable[..., float]] = {
     b"ATAN": lambda x: math.degrees(math.atan(x)), b"ATAN2": lambda y, x: math.degrees(math.atan2(y, x)),
 }  # fmt: skip
 _SYSTEM = {b"TRUE": True, b"FALSE": False}
+_WORDS = frozenset([*_SYSTEM, b"NOT", b"B_NOT"])
+"""Names that are no variables where an operand is expected."""
+_MOST = 2**62
+"""A product of whole numbers beyond overflows."""
 
 
 class UntypedNumber(float):
@@ -78,6 +87,17 @@ def evaluate(text: bytes, lookup: Lookup) -> Value:
     if _NAME.match(text) and text.upper() not in _SYSTEM:
         value = lookup(text.upper(), b"")
         return value if value is not None else _no_constant(text)
+    counted = _COUNTED.match(text)
+    if counted is not None and (name := counted[1].upper()) not in _WORDS:
+        value = lookup(name, b"")
+        if type(value) is int:
+            result = _WHOLE[counted[2]](value, int(counted[3]))
+            if abs(result) <= _MOST:
+                return result
+        elif value is None:
+            return _no_constant(name)
+        elif type(value) is UnknownValue:
+            return value
     part = _PART.match(text.strip(b" \t"))
     if part is not None and (name := part[1].upper()) not in _SYSTEM:
         path = _path(part[2])
@@ -223,7 +243,7 @@ class _Parser:
                 left = abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)  # whole numbers stay whole
             else:
                 left = a / b
-            if isinstance(left, int) and abs(left) > 2**62:
+            if isinstance(left, int) and abs(left) > _MOST:
                 raise self._unknown("it overflows")
         return left
 

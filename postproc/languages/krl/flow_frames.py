@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from postproc.languages.core.motion_sources import Meeting
 from postproc.languages.core.persistent_map import PersistentMap
 from postproc.languages.krl.execution_context import Flow, SplineBlock
 from postproc.languages.krl.lexing import LOOPS
+from postproc.languages.krl.modal_state import ModalState
 from postproc.languages.krl.program_blocks import Block, Routine
 
 
@@ -34,10 +36,10 @@ class BlockFrame:
     followed: its condition is constant, and it runs as that says; else every branch may run, and a loop any number of
     times.  before: what holds before it, None where nothing leads there.  exits: what holds where its branches, or EXIT
     in it, leave it so far.  Of branches: chosen: index of the only one that runs, None where any may; falls_through:
-    none of them may run.  Of loops that are not followed: head: what holds before each pass; mark: of its sources.
+    none of them may run.  Of loops that are not followed: head: what holds before each pass; meeting: of these.
     counter: of a FOR that is followed: name, value, last value, step.  Of a call: back: where it goes on; returned:
     which parameter comes back into which variable (name, path); lost: variables of which one changes a part; saved:
-    what the caller's variables hold.
+    what the caller's variables hold.  Of a spline: opened: what its WITH sets.
     """
 
     block: Block
@@ -48,12 +50,13 @@ class BlockFrame:
     chosen: int | None = None
     falls_through: bool = False
     head: Flow | None = None
-    mark: bytes = b""
+    meeting: Meeting = field(default_factory=Meeting)
     counter: tuple[bytes, int, int, int] | None = None
     back: int = -1
     returned: tuple[tuple[bytes, bytes, bytes], ...] = ()
     lost: frozenset[bytes] = frozenset()
     saved: tuple[tuple[bytes, PersistentMap | None], ...] = ()
+    opened: ModalState | None = None
 
     @property
     def repeats(self) -> bool:
@@ -68,7 +71,7 @@ class LabelHead:
     flow: Flow | None
     entry: Flow | None
     checkpoint: Checkpoint
-    mark: bytes
+    meeting: Meeting
 
 
 @dataclass(eq=False)

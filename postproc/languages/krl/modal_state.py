@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields
-from itertools import compress
-from operator import attrgetter, is_not
-from typing import Any
+from dataclasses import dataclass, field
+from operator import attrgetter
 
 import numpy as np
 
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
+from postproc.languages.core.field_joins import SOMETIMES, FieldJoins, either, is_same, lost
+from postproc.languages.core.frame_table import FrameTable
+from postproc.languages.core.motion_sources import ELSEWHERE, START, Source
 from postproc.languages.krl.external_axes import ALL_LOST, UNSTATED, six
 from postproc.languages.krl.spatial import ZERO, Numbers
 from postproc.languages.krl.statement_effects import Effect
@@ -21,11 +21,6 @@ from postproc.toolpath import LOST, ArcFrame, FrameRef, OrientationMode
 NOT_TO_TARGET = (OrientationMode.CONSTANT, OrientationMode.UNKNOWN)
 """Modes in which a path motion may end with another orientation than that of its target."""
 NAN = float("nan")
-Source = int | bytes
-"""A row after which the robot may be here, or the mark of a place where several paths meet."""
-START, ELSEWHERE = -1, -2
-"""Sources that are no rows: the start of the program, and what this file does not contain."""
-
 Record = dict[bytes, bytes]
 """FDAT, LDAT or PDAT: key -> value, upper case."""
 
@@ -45,62 +40,58 @@ def _pose(values: Numbers) -> Poses:
     return Poses.from_abc(np.array(values[:3]) * MM, np.array(values[3:]) * DEG)
 
 
-class FrameRegister:
+class FrameRegister(FrameTable):
     """The frames of a program, each once."""
 
     def __init__(self) -> None:
-        self._index: dict[tuple[int | None, Numbers | None, bool], int] = {}
+        super().__init__()
         self._values: list[Numbers | None] = []
         self._within: list[Numbers] = []
-        self._refs: list[FrameRef] = []
 
     def known(self, number: int | None, values: Numbers | None, line: int) -> FrameIndex:
         """The frame of this number and pose (X..C, mm and deg); number 0 is the identity."""
         if number == 0:
             values = ZERO
-        key = (number, values, False)
-        if key not in self._index:
-            pose = None if values is None else _pose(values)
-            self._index[key] = len(self._refs)
-            self._values.append(values)
-            self._within.append(ZERO)
-            self._refs.append(FrameRef(number, pose, line))
-        return FrameIndex(self._index[key], line)
+        found = self.index(
+            (number, values, False), lambda: FrameRef(number, None if values is None else _pose(values), line)
+        )
+        return self._with(found, line, values, ZERO)
 
     def in_entry(self, entry: FrameEntry, line: int) -> FrameIndex:
         """The frame that is, or is stated in, an entry whose pose the program does not state."""
         if entry.within == ZERO:
             return self.known(entry.number, None, line)
-        key = (entry.number, entry.within, True)
-        if key not in self._index:
-            self._index[key] = len(self._refs)
-            self._values.append(None)
-            self._within.append(entry.within)
-            self._refs.append(FrameRef(None, None, line, in_entry=(entry.number, _pose(entry.within))))
-        return FrameIndex(self._index[key], line)
+        found = self.index(
+            (entry.number, entry.within, True),
+            lambda: FrameRef(None, None, line, in_entry=(entry.number, _pose(entry.within))),
+        )
+        return self._with(found, line, None, entry.within)
+
+    def _with(self, index: int, line: int, values: Numbers | None, within: Numbers) -> FrameIndex:
+        if index == len(self._values):
+            self._values.append(values)
+            self._within.append(within)
+        return FrameIndex(index, line)
 
     def values(self, frame: FrameIndex | UnknownValue) -> Numbers | None:
         return self._values[frame.index] if isinstance(frame, FrameIndex) else None
 
     def of_other(self, frame: FrameIndex, other: FrameRegister, line: int) -> FrameIndex:
         """The same frame as one of another register."""
-        entry = other._refs[frame.index].in_entry
+        entry = other.refs[frame.index].in_entry
         if entry is not None:
             return self.in_entry(FrameEntry("", "", b"", entry[0], other._within[frame.index]), line)
-        return self.known(other._refs[frame.index].number, other._values[frame.index], line)
+        return self.known(other.refs[frame.index].number, other._values[frame.index], line)
 
     def copied(self, frame: FrameIndex | UnknownValue, table: bytes) -> KrlTarget | FrameEntry | None:
         """What a variable holds to which a frame of ``table``, BASE or TOOL, is assigned; None where it is unknown."""
         if not isinstance(frame, FrameIndex):
             return None
-        values, entry = self._values[frame.index], self._refs[frame.index].entry
+        values, entry = self._values[frame.index], self.refs[frame.index].entry
         if values is not None or entry is None:
             return known(values or ZERO)
         why = f"its value is {table.decode()}_DATA[{entry}], whose numbers no program states"
         return FrameEntry("KRL002", why, table, entry, self._within[frame.index])
-
-    def refs(self) -> tuple[FrameRef, ...]:
-        return tuple(self._refs)
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,32 +220,15 @@ class ModalState:
 
 _OF_POINT = ("point", "point_frames", "anchor", "point_unknown")
 _POINT_OF = attrgetter(*_OF_POINT)
-_NAMES = tuple(entry.name for entry in fields(ModalState) if entry.name not in (*_OF_POINT, "sources"))
-_VALUES = attrgetter(*_NAMES)
 
 
 def joined(one: ModalState, other: ModalState) -> ModalState:
     """What holds where two paths meet, but for ``sources``; ``one`` itself where the other path adds nothing."""
-    changed: dict[str, object] = {}
-    values, others = _VALUES(one), _VALUES(other)
-    for name in compress(_NAMES, map(is_not, values, others)):
-        a, b = getattr(one, name), getattr(other, name)
-        if _same(a, b):
-            continue
-        value = _JOINS[name](a, b)
-        if not _same(value, a):
-            changed[name] = value
+    changed = _JOINS.changes(one, other)
     point = _joined_points(one, other)
-    if not all(map(_same, point, _POINT_OF(one))):
+    if not is_same(point, _POINT_OF(one)):
         changed |= zip(_OF_POINT, point, strict=True)
     return one.changed(**changed) if changed else one
-
-
-def _same(one: object, other: object) -> bool:
-    """Whether two values are one, and so are two that are not numbers."""
-    if isinstance(one, tuple) and isinstance(other, tuple):
-        return len(one) == len(other) and all(map(_same, one, other))
-    return one is other or one == other or (one != one and other != other)
 
 
 def _joined_frames(
@@ -281,7 +255,7 @@ def _joined_points(
     two paths differ."""
     own = _POINT_OF(one)
     same = one.point_frames == other.point_frames and one.anchor == other.anchor
-    if same and _same(one.point, other.point):
+    if same and is_same(one.point, other.point):
         return own
     if not (one.point or one.anchor):
         return own if one.point_frames is None else (None, None, None, one.point_unknown)
@@ -289,44 +263,40 @@ def _joined_points(
         return None, None, None, other.point_unknown
     if same and one.point is not None and other.point is not None:
         pairs = zip(one.point, other.point, strict=True)
-        point = six([a if _same(a, b) else NAN for a, b in pairs])
+        point = six([a if is_same(a, b) else NAN for a, b in pairs])
         if any(value == value for value in point):
             why = one.point_unknown if point == one.point else _varies(one, other)
             return point, one.point_frames, one.anchor, why
     return None, None, None, _varies(one, other)
 
 
-def _either(one: Any, other: Any) -> Any:
-    return one or other
-
-
-def _or_none(one: object, other: object) -> None:
-    return None
-
-
-_JOINS: dict[str, Callable[[Any, Any], object]] = {
-    "base": lambda one, other: _joined_frames(one, other, "$BASE"),
-    "tool": lambda one, other: _joined_frames(one, other, "$TOOL"),
-    "feed": lambda one, other: NAN,
-    "blend": lambda one, other: NAN,
-    "tool_known": _either,
-    "axes": _or_none,
-    "frames_record": _or_none,
-    "path_record": _or_none,
-    "axis_record": _or_none,
-    "form": _or_none,
-    "orientation": lambda one, other: OrientationMode.UNKNOWN,
-    "arc_frame": lambda one, other: ArcFrame.UNKNOWN,
-    "external": lambda one, other: six([a if _same(a, b) else LOST for a, b in zip(one, other, strict=True)]),
-    "external_apart": frozenset.union,
-    "no_insert": _either,
-    "root_set": _either,
-    "later_since": _either,
-    "later_speed": frozenset.union,
-    "overridden": frozenset.union,
-    "stop": lambda one, other: 1,
-    "no_advance": lambda one, other: 1,
-    "moved_later": _either,
-    "ended_later": _either,
-    "point_line": lambda one, other: one,
-}
+_JOINS = FieldJoins(
+    {
+        "base": lambda one, other: _joined_frames(one, other, "$BASE"),
+        "tool": lambda one, other: _joined_frames(one, other, "$TOOL"),
+        "feed": lost(NAN),
+        "blend": lost(NAN),
+        "tool_known": either,
+        "axes": lost(None),
+        "frames_record": lost(None),
+        "path_record": lost(None),
+        "axis_record": lost(None),
+        "form": lost(None),
+        "orientation": lost(OrientationMode.UNKNOWN),
+        "arc_frame": lost(ArcFrame.UNKNOWN),
+        "external": lambda one, other: six(
+            [a if is_same(a, b) else LOST for a, b in zip(one, other, strict=True)]
+        ),
+        "external_apart": frozenset.union,
+        "no_insert": either,
+        "root_set": either,
+        "later_since": either,
+        "later_speed": frozenset.union,
+        "overridden": frozenset.union,
+        "stop": SOMETIMES,
+        "no_advance": SOMETIMES,
+        "moved_later": either,
+        "ended_later": either,
+        "point_line": lambda one, other: one,
+    }
+)

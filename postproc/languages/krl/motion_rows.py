@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 from postproc.base.arrays import Floats
 from postproc.base.document import Document
+from postproc.languages.core.motion_sources import Meeting, Source
 from postproc.languages.krl.external_axes import UNSTATED, carried_on, six
-from postproc.languages.krl.modal_state import Anchor, FrameIndex, ModalState, Source
+from postproc.languages.krl.modal_state import Anchor, FrameIndex, ModalState
 from postproc.languages.krl.source_map import Auxiliary, PointVariable, Relative
 from postproc.languages.krl.spatial import Arc, Numbers
 from postproc.languages.krl.target import KrlTarget, UnknownValue
@@ -18,9 +19,6 @@ from postproc.toolpath import Annotation
 
 NAN = float("nan")
 NAN6: Numbers = (NAN,) * 6
-FEW = 8
-"""Places where the robot may come from that are kept apart."""
-
 NO_ARC = (NAN,) * 7
 
 
@@ -75,6 +73,7 @@ class MotionRows:
     ``sources_of``: rows that may start elsewhere than where the row before ends -> where.
     ``stopped``: rows before which the advance run stops (2) or may (1);
     ``stopped_at_end``: the same of ends of routines: the count of rows, their sources, and 2 or 1.
+    ``meetings``: of places that have a name: labels, routines.
     ``calls``: the count of rows, and after which ones a routine of another module moves the robot.
     ``unfollowed_ends``: where routines end after which it is not known what runs.
     ``never_from``: the first row of those that never run.
@@ -100,7 +99,7 @@ class MotionRows:
     approximated: dict[int, float] = field(default_factory=dict)
     builds_on: dict[int, frozenset[Source]] = field(default_factory=dict)
     reads: list[tuple[int, frozenset[Source]]] = field(default_factory=list)
-    sources: defaultdict[bytes, set[Source]] = field(default_factory=lambda: defaultdict(set))
+    meetings: defaultdict[bytes, Meeting] = field(default_factory=lambda: defaultdict(Meeting))
     annotations: list[Annotation] = field(default_factory=list)
     comments: list[Annotation] = field(default_factory=list)
     passing: dict[int, bool] = field(default_factory=dict)
@@ -159,19 +158,9 @@ class MotionRows:
         """Notes that after these a routine of another module moves the robot first."""
         self.calls.append((self.count, sources))
 
-    def new_mark(self) -> bytes:
-        """A mark of its own, without sources."""
-        mark = b"join %d" % len(self.sources)
-        self.sources[mark] = set()
-        return mark
-
-    def joined(self, sources: frozenset[Source]) -> frozenset[Source]:
-        """The same rows and marks, as one mark where they are many."""
-        if len(sources) <= FEW:
-            return sources
-        mark = self.new_mark()
-        self.sources[mark] |= sources
-        return frozenset([mark])
+    def label(self, start: int, name: bytes) -> Meeting:
+        """Where the paths to a label of the routine meet that starts with this statement."""
+        return self.meetings[b"label %d " % start + name]
 
     def truncate(self, count: int) -> None:
         """Takes the rows from ``count`` on out again."""

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.base.arrays import Floats
+from postproc.base.batches import each_block
 from postproc.base.document import offset_type
 from postproc.base.geometry import rotation_from_abc
 from postproc.base.units import DEG, MM
 from postproc.languages.krl.external_axes import UNSTATED, six
-from postproc.languages.krl.motion_rows import NAN, NAN6, NO_ARC, MotionRow, MotionRows
+from postproc.languages.krl.motion_rows import NAN, NAN6, NO_ARC, MotionRow, MotionRows, VectorisedLot
 from postproc.languages.krl.spatial import Numbers
 from postproc.languages.krl.target import KrlTarget
 from postproc.languages.krl.vectorised import VectorisedLines
@@ -43,15 +44,18 @@ class Spots:
         self.text = np.arange(n, dtype=np.int32)
         self._first: dict[int, int] = {}
 
-    def take_bulk(self, part: slice, vectorised: VectorisedLines) -> None:
-        """Common lines; where they run again they keep the numbers of their texts."""
+    def first_of(self, part: slice, vectorised: VectorisedLines) -> int:
+        """The number of the first text of common lines; where they run again they keep the numbers of their texts."""
+        return self._first.setdefault(id(vectorised), part.start)
+
+    def take_bulk(self, part: slice, first: int, vectorised: VectorisedLines) -> None:
+        """Common lines; ``first``: of ``first_of``."""
         self.start[part], self.stop[part], self.motion[part] = (
             vectorised.start,
             vectorised.stop,
             vectorised.motion,
         )
         self.insert[part] = vectorised.stop[:, 5]
-        first = self._first.setdefault(id(vectorised), part.start)
         self.text[part] = np.arange(first, first + len(vectorised))
 
     def take(self, part: slice, rows: list[MotionRow]) -> None:
@@ -62,6 +66,21 @@ class Spots:
         self.inherits[part] = columns.inherits
         self.start[part], self.stop[part], self.file[part] = targets.start, targets.stop, targets.file
         self.insert[part], self.home[part] = targets.insert, targets.home
+
+
+class _Groups:
+    """Runs of common lines, with the rows and the number of the first text of each, in groups of ``BLOCK`` rows."""
+
+    def __init__(self) -> None:
+        self.groups: list[list[tuple[slice, int, VectorisedLot]]] = []
+        self._rows = BLOCK
+
+    def add(self, part: slice, first: int, lot: VectorisedLot) -> None:
+        if self._rows >= BLOCK:
+            self.groups.append([])
+            self._rows = 0
+        self.groups[-1].append((part, first, lot))
+        self._rows += part.stop - part.start
 
 
 def _first(rows: MotionRows) -> Numbers:
@@ -97,7 +116,7 @@ class MotionTable:
         self.ways: dict[int, tuple[float, ...]] = {}
         self.scalar_rows: list[tuple[int, MotionRow]] = []
         self.external: Floats = np.broadcast_to(np.array(_first(rows)), (n, 6))
-        at = 0
+        at, bulk = 0, _Groups()
         rows.chunks.reverse()
         while rows.chunks:
             chunk = rows.chunks.pop()
@@ -106,24 +125,32 @@ class MotionTable:
                     self._fill(at + first, chunk[first : first + BLOCK])
                 at += len(chunk)
                 continue
-            vectorised = chunk.vectorised
-            part = slice(at, at + len(vectorised))
+            part = slice(at, at + len(chunk.vectorised))
+            self._state(part, chunk.vectorised.status, chunk.vectorised.turn)
+            self._external(part, np.array(chunk.external))
+            bulk.add(part, 0 if self.spots is None else self.spots.first_of(part, chunk.vectorised), chunk)
+            at = part.stop
+        each_block(lambda group: self._take_bulk(bulk.groups[group.start]), len(bulk.groups), 1)
+        for row, blend in rows.approximated.items():
+            self.blend[row] = blend
+
+    def _take_bulk(self, group: list[tuple[slice, int, VectorisedLot]]) -> None:
+        """The rows of runs of common lines, which are taken away."""
+        group.reverse()
+        while group:
+            part, first, lot = group.pop()
+            vectorised = lot.vectorised
             self._place(part, vectorised.values)
             self.kind[part] = np.where(vectorised.is_line, Kind.LIN, Kind.PTP)
             self.line[part] = vectorised.line + np.arange(len(vectorised))
-            self._state(part, vectorised.status, vectorised.turn)
-            self._external(part, np.array(chunk.external))
-            self.base[part], self.tool[part] = chunk.base, chunk.tool
-            self.feed[part] = np.where(vectorised.is_line, chunk.feed, NAN)
-            self.blend[part] = np.array([0.0, chunk.blend, NAN])[vectorised.approximation]
-            self.inserted[part] = chunk.blend
+            self.base[part], self.tool[part] = lot.base, lot.tool
+            self.feed[part] = np.where(vectorised.is_line, lot.feed, NAN)
+            self.blend[part] = np.array([0.0, lot.blend, NAN])[vectorised.approximation]
+            self.inserted[part] = lot.blend
             self.word[part] = vectorised.motion[:, 0]
-            self.orientation[part], self.arc_frame[part] = chunk.orientation, chunk.arc_frame
+            self.orientation[part], self.arc_frame[part] = lot.orientation, lot.arc_frame
             if self.spots is not None:
-                self.spots.take_bulk(part, vectorised)
-            at += len(vectorised)
-        for row, blend in rows.approximated.items():
-            self.blend[row] = blend
+                self.spots.take_bulk(part, first, vectorised)
 
     def _state(self, part: slice, status: NDArray[np.int32], turn: NDArray[np.int32]) -> None:
         """S and T; where no motion has them they take no memory."""
@@ -144,7 +171,10 @@ class MotionTable:
 
     def _place(self, part: slice, values: Floats) -> None:
         self.position[part] = values[:, :3] * MM
-        self.rotation[part] = rotation_from_abc(values[:, 3:] * DEG)
+        angles = values[:, 3:]
+        bits = angles.view(np.int64)  # a zero may have a sign
+        same = len(bits) > 1 and bool((bits == bits[0]).all())
+        self.rotation[part] = rotation_from_abc((angles[:1] if same else angles) * DEG)
 
     def _fill(self, at: int, rows: list[MotionRow]) -> None:
         part = slice(at, at + len(rows))

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from postproc.languages.core.motion_sources import ELSEWHERE
 from postproc.languages.krl.arc_motions import move_on_arc
 from postproc.languages.krl.assignments import with_clause
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.lexing import LONGEST, Statement, identifiers
-from postproc.languages.krl.modal_state import ELSEWHERE, NAN, NOT_TO_TARGET, ModalState
+from postproc.languages.krl.modal_state import NAN, NOT_TO_TARGET, ModalState
 from postproc.languages.krl.motion_entry import enter_motion, extent
 from postproc.languages.krl.motion_refusals import (
     frames_missing,

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from postproc.base.byte_search import occurs
 from postproc.base.document import Document
+from postproc.languages.core.motion_sources import ELSEWHERE, START
 from postproc.languages.krl.aliases import parameters_of
 from postproc.languages.krl.data import (
     Declarations,
@@ -19,7 +20,7 @@ from postproc.languages.krl.data import (
     read_references,
 )
 from postproc.languages.krl.lexing import Call, Statement, StatementKind, split_values
-from postproc.languages.krl.modal_state import ELSEWHERE, START, FrameIndex, FrameRegister, ModalState
+from postproc.languages.krl.modal_state import FrameIndex, FrameRegister, ModalState
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.predecessors import expanded
 from postproc.languages.krl.program_blocks import Routine

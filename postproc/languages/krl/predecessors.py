@@ -8,12 +8,13 @@ from collections.abc import Iterable
 import numpy as np
 
 from postproc.base.arrays import Bools
-from postproc.languages.krl.modal_state import ELSEWHERE, Source
+from postproc.languages.core import motion_sources
+from postproc.languages.core.motion_sources import ELSEWHERE, Meeting, Source
 from postproc.languages.krl.motion_rows import MotionRows
 
 MOST = 30
 """Predecessors of a motion that are distinguished."""
-_MARKS = 4 * MOST
+_MEETINGS = 4 * MOST
 """Places where paths meet that are looked at for them."""
 _TWO = 2
 """So many sources are distinguished; more are as good as two."""
@@ -53,7 +54,7 @@ def predecessors(rows: MotionRows, continues: Bools) -> dict[int, tuple[int, ...
 
 
 def _few(rows: MotionRows, sources: frozenset[Source], many: set[Source]) -> set[int]:
-    """The rows after sources, none where they are more than ``MOST``; many: marks that stand for so many, to which
+    """The rows after sources, none where they are more than ``MOST``; many: meetings of so many, to which
     those are added that are found to."""
     seen: set[Source] = set()
     found: set[int] = set()
@@ -66,8 +67,8 @@ def _few(rows: MotionRows, sources: frozenset[Source], many: set[Source]) -> set
         if isinstance(source, int):
             found.add(_there(rows, source))
         else:
-            todo.extend(rows.sources[source])
-        if source in many or len(found) > MOST or len(seen) > _MARKS:
+            todo.extend(source.sources)
+        if source in many or len(found) > MOST or len(seen) > _MEETINGS:
             if len(sources) == 1:
                 many |= sources
             return set()
@@ -80,22 +81,9 @@ def _sources_of_others(rows: MotionRows, single: Bools) -> Iterable[Source]:
     return others | rows.unfollowed_ends
 
 
-def expanded(rows: MotionRows, sources: Iterable[Source], visited: set[Source] | None = None) -> set[int]:
-    """The rows (and ``START``, ``ELSEWHERE``) among sources, with those after marks; without what ``visited`` has,
-    which takes up all that is found."""
-    visited = set() if visited is None else visited
-    found: set[int] = set()
-    todo = list(sources)
-    while todo:
-        source = todo.pop()
-        if source in visited:
-            continue
-        visited.add(source)
-        if isinstance(source, int):
-            found.add(_there(rows, source))
-        else:
-            todo.extend(rows.sources[source])
-    return found
+def expanded(rows: MotionRows, sources: Iterable[Source], visited: set[Meeting] | None = None) -> set[int]:
+    """The rows (and ``START``, ``ELSEWHERE``) among sources, as of the core."""
+    return {_there(rows, source) for source in motion_sources.expanded(sources, visited)}
 
 
 def _there(rows: MotionRows, row: int) -> int:
@@ -103,7 +91,7 @@ def _there(rows: MotionRows, row: int) -> int:
     return row if row < len(rows) else ELSEWHERE
 
 
-def _distinct(sources: Iterable[Source], resolved: dict[bytes, set[int]]) -> set[int]:
+def _distinct(sources: Iterable[Source], resolved: dict[Meeting, set[int]]) -> set[int]:
     found: set[int] = set()
     for source in sources:
         found |= {source} if isinstance(source, int) else resolved[source]
@@ -112,24 +100,27 @@ def _distinct(sources: Iterable[Source], resolved: dict[bytes, set[int]]) -> set
     return found
 
 
-def _resolved(rows: MotionRows) -> dict[bytes, set[int]]:
-    """Mark -> the rows that it represents, of more than two some two."""
-    users: dict[bytes, list[bytes]] = defaultdict(list)
-    resolved: dict[bytes, set[int]] = {}
-    todo: list[tuple[bytes, int]] = []
-    for mark, sources in rows.sources.items():
-        resolved[mark] = set()
-        for source in sources:
+def _resolved(rows: MotionRows) -> dict[Meeting, set[int]]:
+    """Of the meetings from which rows may start, the rows that meet there; of more than two some two."""
+    users: defaultdict[Meeting, list[Meeting]] = defaultdict(list)
+    resolved: dict[Meeting, set[int]] = {}
+    todo: list[tuple[Meeting, int]] = []
+    waiting = [one for sources in rows.sources_of.values() for one in sources if isinstance(one, Meeting)]
+    while waiting:
+        meeting = waiting.pop()
+        if meeting in resolved:
+            continue
+        resolved[meeting] = set()
+        for source in meeting.sources:
             if isinstance(source, int):
-                todo.append((mark, source))
+                todo.append((meeting, source))
             else:
-                users[source].append(mark)
+                users[source].append(meeting)
+                waiting.append(source)
     while todo:
-        mark, row = todo.pop()
-        known = resolved.setdefault(mark, set())
+        meeting, row = todo.pop()
+        known = resolved[meeting]
         if row not in known and len(known) < _TWO:
             known.add(row)
-            todo.extend((user, row) for user in users[mark])
-    for mark in users:
-        resolved.setdefault(mark, set())
+            todo.extend((user, row) for user in users[meeting])
     return resolved

@@ -6,6 +6,7 @@ import contextlib
 import re
 from dataclasses import replace
 
+from postproc.languages.core.motion_sources import ELSEWHERE
 from postproc.languages.core.waits import Waits
 from postproc.languages.krl import motions
 from postproc.languages.krl.advance_run import advance_of, stop_of
@@ -26,7 +27,6 @@ from postproc.languages.krl.lexing import (
     identifiers,
 )
 from postproc.languages.krl.modal_state import (
-    ELSEWHERE,
     NAN,
     TRIGGERED,
     FrameRegister,
@@ -114,7 +114,7 @@ class ProgramFlow(Calls):
         module, routine = others.routines[name]
         register = FrameRegister()
         entry = state_at_entry(state, run.frames, register)
-        key = name, repr((entry, register.refs(), args))
+        key = name, repr((entry, tuple(register.refs), args))
         if key not in others.outcomes:
             others.outcomes[key] = None  # of a call of itself nothing is known
             few = run.depth < MOST_DEPTH and len(others.outcomes) < MOST_OUTCOMES
@@ -146,9 +146,9 @@ class ProgramFlow(Calls):
     def _walk(self, routine: Routine) -> None:
         """Goes over a routine of whose callers nothing is known."""
         run = self.run
-        mark = b"routine %d" % routine.line
-        run.rows.sources[mark].add(ELSEWHERE)
-        run.state = ModalState(sources=frozenset([mark]), stop=Waits.MAYBE)
+        callers = run.rows.meetings[b"routine %d" % routine.line]
+        callers.sources.add(ELSEWHERE)
+        run.state = ModalState(sources=frozenset([callers]), stop=Waits.MAYBE)
         run.state.root_set, run.state.later_since = run.root_set, run.later_since
         run.state.later_speed, run.state.ended_later = run.later_speed, run.ended_later
         run.state.moved_later = run.moved_later
@@ -227,15 +227,16 @@ class ProgramFlow(Calls):
             return pc + 1
         if kind != StatementKind.MOTION:
             self._advance_run(pc, item)
-        if not item.code.isascii() and kind != StatementKind.MOTION and has_foreign_letters(item.code):
+        code, structure = item.code, run.structure
+        if not code.isascii() and kind != StatementKind.MOTION and has_foreign_letters(code):
             self._report_letters(item)
         run.variables.line = item.line
-        if item.code in run.structure.ill_formed:
+        if structure.ill_formed and code in structure.ill_formed:
             why = f"after line {item.line}, which is not understood"
-            run.forget(effects_of_unknown(item.code), why)
-        if b"(" in item.code:
+            run.forget(effects_of_unknown(code), why)
+        if b"(" in code:
             self._call_functions(item)
-        if pc in run.structure.events:
+        if pc in structure.events:
             there = self._block_event(pc, item)
             if there is not None or not self.reachable:
                 return pc + 1 if there is None else there
@@ -269,6 +270,9 @@ class ProgramFlow(Calls):
             run.state.external = by_themselves(run.state.external, item.code)
         elif item.word == b"TIME_BLOCK" and run.spline is not None:
             run.state.feed = NAN  # the block takes a time
+            for frame in self.stack:
+                if frame.opened is not None:
+                    frame.opened.feed = NAN
         elif kind == StatementKind.OTHER and run.structure.has_routine and HIDDEN.search(item.code):
             motions.unknown_motion(run, item)
         elif item.word in EVENTS:

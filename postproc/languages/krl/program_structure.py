@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from postproc.languages.core.reach import reached
 from postproc.languages.krl.aliases import Handed, Parameters, parameters_of, spread
 from postproc.languages.krl.later_changes import EVENTS, later_actions, later_functions
 from postproc.languages.krl.lexing import (
@@ -370,7 +371,8 @@ def spread_later(structure: ProgramStructure, others: Mapping[bytes, Parameters]
 
 def closure(structure: ProgramStructure, names: Iterable[bytes]) -> set[bytes]:
     """The routines of the file among ``names``, and all that they call."""
-    return _reached(structure.routines, names, lambda name: structure.routines[name].calls)
+    routines = structure.routines
+    return reached(routines.keys() & set(names), lambda name: routines[name].calls & routines.keys())
 
 
 def callers(structure: ProgramStructure, names: Iterable[bytes]) -> set[bytes]:
@@ -379,19 +381,7 @@ def callers(structure: ProgramStructure, names: Iterable[bytes]) -> set[bytes]:
     for name, routine in structure.routines.items():
         for call in routine.calls:
             callers_of.setdefault(call, set()).add(name)
-    return _reached(structure.routines, names, lambda name: callers_of.get(name, ()))
-
-
-def _reached(
-    routines: Mapping[bytes, Routine], names: Iterable[bytes], steps: Callable[[bytes], Iterable[bytes]]
-) -> set[bytes]:
-    seen = {name for name in names if name in routines}
-    todo = list(seen)
-    while todo:
-        new = {name for name in steps(todo.pop()) if name in routines and name not in seen}
-        seen |= new
-        todo += new
-    return seen
+    return reached(structure.routines.keys() & set(names), lambda name: callers_of.get(name, ()))
 
 
 def _join(into: Effects, more: Iterable[Effect]) -> None:

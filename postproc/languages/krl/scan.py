@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import re
 from codecs import BOM_UTF8
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import lru_cache
-from itertools import chain, pairwise
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -18,9 +18,10 @@ from postproc.base.array_storage import ArrayStore
 from postproc.base.arrays import Floats, is_shared
 from postproc.base.batches import in_blocks
 from postproc.base.decimals import literals
-from postproc.base.document import BLOCK, Document, offset_type
+from postproc.base.document import Document, offset_type
 from postproc.languages.krl.external_axes import UNSTATED, six
 from postproc.languages.krl.lexing import Statement, StatementKind, statement
+from postproc.languages.krl.lines_alike import lines_alike, pieces
 from postproc.languages.krl.spatial import Numbers
 from postproc.languages.krl.target import COMPONENTS, KrlTarget, parse
 from postproc.languages.krl.vectorised import Item, VectorisedLines
@@ -65,13 +66,10 @@ def scan(document: Document, fast: bool) -> Iterator[Item]:
 def _items(document: Document, fast: bool) -> Iterator[Item]:
     raw = document.raw
     store = ArrayStore()
-    line, place = 1, len(BOM_UTF8) if document.raw.startswith(BOM_UTF8) else 0
-    runs = [found.span() for found in _RUN.finditer(raw, place)] if fast else []
-    groups = _groups(runs)
-    read = in_blocks(
-        lambda part: [_vectorised_lines(raw, *run) for group in groups[part] for run in group], len(groups), 1
-    )
-    for (start, stop), found in zip(runs, chain.from_iterable(read), strict=True):
+    line, place = 1, len(BOM_UTF8) if raw.startswith(BOM_UTF8) else 0
+    parts = list(pieces(raw, place)) if fast else []
+    read = in_blocks(lambda part: [_runs(raw, *piece) for piece in parts[part]], len(parts), 1)
+    for start, stop, found in chain.from_iterable(chain.from_iterable(read)):
         yield from _lines(raw, line, place, start)
         line += raw.count(b"\n", place, start)
         vectorised = _compacted(found, line, store)
@@ -81,12 +79,13 @@ def _items(document: Document, fast: bool) -> Iterator[Item]:
     yield from _lines(raw, line, place, len(raw))
 
 
-def _groups(runs: Sequence[tuple[int, int]]) -> list[Sequence[tuple[int, int]]]:
-    """The runs, in groups of as many bytes as are read at a time."""
-    ends = np.cumsum([stop - start for start, stop in runs])
-    cuts = np.searchsorted(ends, np.arange(BLOCK, ends[-1] if runs else 0, BLOCK)) + 1
-    bounds = [0, *np.unique(cuts).tolist(), len(runs)]
-    return [runs[a:b] for a, b in pairwise(bounds) if a < b]
+def _runs(raw: bytes, start: int, stop: int) -> list[tuple[int, int, VectorisedLines]]:
+    """The runs of common lines between two bytes that start a line, each with its span."""
+    alike = lines_alike(raw, start, stop)
+    if alike is not None and len(alike) >= FEWEST:
+        return [(start, stop, alike)]
+    spans = [found.span() for found in _RUN.finditer(raw, start, stop)]
+    return [(*span, _vectorised_lines(raw, *span)) for span in spans]
 
 
 def _compacted(vectorised: VectorisedLines, line: int, store: ArrayStore) -> VectorisedLines:

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from postproc.base.document import Document
-from postproc.base.read_files import list_folder, note_absent, note_listing, read_file
+from postproc.base.read_files import note_absent, note_listing
+from postproc.languages.core.sibling_files import document_of, files_in
 from postproc.languages.dialect import Program, ReadingSettings
 from postproc.languages.krl.data import DEFAULTS
 from postproc.languages.krl.lexing import FRAME_TABLES, identifiers
@@ -42,7 +43,7 @@ def find(program: Program, settings: ReadingSettings, beside: Path | None = None
     modules = {name[:-2].lower() for name in wanted if name.endswith("()")} - stems
     found: list[Document] = []
     if not any("config" in one.path.stem.lower() for one in (*settings.references, *settings.siblings)):
-        found += [_document(one) for one in _configs(folders[0])]
+        found += [document_of(one) for one in _configs(folders[0])]
     for folder in folders:
         if found_here := _beside(folder, modules, names, stems):
             found += found_here
@@ -52,9 +53,8 @@ def find(program: Program, settings: ReadingSettings, beside: Path | None = None
 
 def _beside(folder: Path, modules: set[str], names: set[bytes], stems: set[str]) -> list[Document]:
     """The files of these modules in a folder, and data lists other than ``stems`` that declare one of the names."""
-    try:
-        files = [one for one in list_folder(folder) if one.is_file()]
-    except FileNotFoundError:
+    files = files_in(folder)
+    if files is None:
         return []
     for stem in modules - {one.stem.lower() for one in files if one.suffix.lower() == ".src"}:
         note_absent(folder / f"{stem}.src")
@@ -64,16 +64,12 @@ def _beside(folder: Path, modules: set[str], names: set[bytes], stems: set[str])
     for file in files:
         suffix, stem = file.suffix.lower(), file.stem.lower()
         if stem in modules and suffix in (".src", ".dat"):
-            found.append(_document(file))
+            found.append(document_of(file))
         elif suffix == ".dat" and names and stem not in stems and stem != _CONFIG[:-4]:
-            document = _document(file)
+            document = document_of(file)
             if _declares(document.raw, names):
                 found.append(document)
     return found
-
-
-def _document(path: Path) -> Document:
-    return Document(path, read_file(path))
 
 
 def _place(path: Path) -> str:

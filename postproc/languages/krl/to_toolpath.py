@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.base.arrays import Bools, FewRows, Floats, Ints, is_shared
+from postproc.base.arrays import Bools, Floats, Ints, is_shared
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
+from postproc.languages.core.motion_sources import ELSEWHERE, Meeting
+from postproc.languages.core.row_facts import OTHER_PATHS, LockedRows, axis_targets, grouped, used_frames
 from postproc.languages.krl.advance_run import stopped_motions
 from postproc.languages.krl.controller_data import with_declared
 from postproc.languages.krl.execution_context import ExecutionContext
-from postproc.languages.krl.modal_state import ELSEWHERE, Source
 from postproc.languages.krl.motion_rows import MotionRows, RowRefusal
 from postproc.languages.krl.motion_table import MotionTable, Spots
 from postproc.languages.krl.predecessors import continuous, expanded, predecessors, single_sources
@@ -25,7 +25,6 @@ from postproc.toolpath import (
     Arcs,
     Configuration,
     EditConstraints,
-    FrameRef,
     Kind,
     MotionSequence,
     MotionSpeeds,
@@ -39,7 +38,6 @@ from postproc.toolpath import (
 
 READ_TOO = "other code reads it too"
 SEVERAL = "its line runs several times"
-OTHER_PATHS = "several paths of the program lead to it or from the motion before it"
 
 
 def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourceMap | None, list[Finding]]:
@@ -52,15 +50,14 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
     _refuse_several_starts(rows, table, single)
     _lock(run)
     refused = _refused(rows, table)
-    table.base, frames = with_declared(run.declarations.frames, b"BASE", table.base, run.frames.refs())
+    table.base, frames = with_declared(run.declarations.frames, b"BASE", table.base, tuple(run.frames.refs))
     table.tool, frames = with_declared(run.declarations.frames, b"TOOL", table.tool, frames)
-    table.base, table.tool, used = _used(table.base, table.tool, frames)
+    table.base, table.tool, used = used_frames(table.base, table.tool, frames)
     table.blend *= MM
     table.inserted *= MM
     n = len(rows)
     anchor = _sparse((n,), np.int32(-1), {row: at.row for row, at in rows.anchors.items()})
     given = _partial_components(rows, n)
-    axes = np.array(list(table.axes.values())).reshape(-1, 6) * DEG
     several = _several(table)
     continues = _read_only(continuous(rows, single))
     stopped = _stop(table, stopped_motions(rows, continues))
@@ -69,7 +66,7 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
             kind=_read_only(table.kind),
             position=_read_only(table.position),
             rotation=_read_only(table.rotation),
-            axes=FewRows(np.array(list(table.axes), np.int32), _read_only(axes), n),
+            axes=axis_targets(table.axes, n),
             base=_read_only(table.base),
             tool=_read_only(table.tool),
             frames=used,
@@ -107,7 +104,7 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
         toolpath,
         found,
         [
-            *_reported(rows, table, refused),
+            *grouped(refused, table.line, lambda row: rows.reasons[row].cause),
             *_external_axis_findings(rows, table),
             *_stop_findings(rows, table, stopped),
         ],
@@ -155,16 +152,6 @@ def _partial_components(rows: MotionRows, n: int) -> Floats:
         for row, at in rows.anchors.items()
     }
     return _sparse((n, 6), np.nan, known, np.array([MM] * 3 + [DEG] * 3))
-
-
-def _used(base: Ints, tool: Ints, frames: tuple[FrameRef, ...]) -> tuple[Ints, Ints, tuple[FrameRef, ...]]:
-    """The indices and frames without those that no motion has: nobody needs to know their pose."""
-    present = np.zeros(len(frames) + 1, bool)
-    present[base] = present[tool] = True  # the last entry is for those that are not known, -1
-    kept = np.flatnonzero(present[:-1]).tolist()
-    renamed = np.full(len(frames) + 1, -1, dtype=np.int32)
-    renamed[kept] = np.arange(len(kept))
-    return renamed[base], renamed[tool], tuple(frames[i] for i in kept)
 
 
 def _refuse_other_calls(run: ExecutionContext, table: MotionTable) -> None:
@@ -352,24 +339,6 @@ def _refused(rows: MotionRows, table: MotionTable) -> dict[int, Finding]:
     return {row: finding(row, reason.code, reason.message) for row, reason in sorted(rows.reasons.items())}
 
 
-def _reported(rows: MotionRows, table: MotionTable, refused: dict[int, Finding]) -> list[Finding]:
-    """The refusals, those of one code and cause as one finding."""
-    groups: dict[tuple[str, str], list[int]] = {}
-    for row in refused:
-        reason = rows.reasons[row]
-        groups.setdefault((reason.code, reason.cause or reason.message), []).append(row)
-    findings = []
-    for found in groups.values():
-        first = refused[found[0]]
-        if len(found) == 1:
-            findings.append(first)
-            continue
-        places = table.line[found]
-        message = f"{first.message}; {len(found)} motions, lines {places.min()} to {places.max()}"
-        findings.append(replace(first, message=message))
-    return findings
-
-
 def _external_axis_findings(rows: MotionRows, table: MotionTable) -> list[Finding]:
     """What ``check`` says of external axes that do not stay where they are first."""
     first: dict[str, int] = {}
@@ -390,23 +359,21 @@ def _external_axis_findings(rows: MotionRows, table: MotionTable) -> list[Findin
 
 def _locked(rows: MotionRows, table: MotionTable, refused: dict[int, Finding]) -> dict[int, Finding]:
     """Rows that a refused motion builds on, or whose reached position the program reads."""
-    pins: dict[int, Finding] = {}
     if not rows.builds_on and not rows.reads:
-        return pins
-    finding = _finder(rows, table)
+        return {}
+    locked = LockedRows(_finder(rows, table), "KRL009", "KRL002")
     every = range(len(rows))
-    seen: set[Source] = set()
+    seen: set[Meeting] = set()
     for row in rows.builds_on:
         if row in refused:
             message = f"the motion in line {table.line[row]} depends on this end point and is not corrected"
-            for pin in _among(every, expanded(rows, rows.builds_on[row], seen)):
-                pins.setdefault(pin, finding(pin, rows.reasons[row].code, message))
+            locked.add(
+                _among(every, expanded(rows, rows.builds_on[row], seen)), rows.reasons[row].code, message
+            )
     seen = set()
     for line, sources in rows.reads:
-        for pin in _among(every, expanded(rows, sources, seen)):
-            message = f"line {line} reads the end position of this motion"
-            pins.setdefault(pin, finding(pin, "KRL002", message))
-    return dict(sorted(pins.items()))
+        locked.are_read(_among(every, expanded(rows, sources, seen)), line)
+    return locked.done()
 
 
 def _among(every: range, rows: set[int]) -> list[int]:

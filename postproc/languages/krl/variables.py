@@ -47,6 +47,8 @@ class Variables:
         self._paths = KeyNumbers()
         self._parts: dict[bytes, list[bytes]] = {}
         self._nothing = PersistentMap(self._paths)
+        self._paths.of(b"")  # the whole is number 0
+        self._no_parts = self._nothing.root[1:]
         self.facts = VariableFacts(PersistentMap(KeyNumbers()), None)
 
     def get(self, name: bytes, path: bytes = b"") -> Value | None:
@@ -57,7 +59,7 @@ class Variables:
     def set(self, name: bytes, path: bytes, value: Value) -> None:
         if not path:
             # The value of the whole takes the place of all of its parts.
-            self._put(name, self._nothing.set(b"", Fact(value, self.line)))
+            self._put(name, PersistentMap(self._paths, (Fact(value, self.line), *self._no_parts)))
             return
         entry = self.facts.names.get(name)
         if entry is None:

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.base.arrays import Bools, Floats, Ints, differs
-from postproc.base.decimals import MOST_DECIMALS, fixed_one, literals
+from postproc.base.decimals import decimals_of, fixed_one, literals
 from postproc.base.document import Document
 from postproc.base.geometry import abc_from_rotation
 from postproc.base.units import DEG, MM
+from postproc.languages.core.plan_rows import PlanRows
 from postproc.languages.dialect import Plan, Program, WritingSettings
 from postproc.languages.krl.lexing import number
 from postproc.languages.krl.source_map import KrlSourceMap
-from postproc.toolpath import Toolpath
 
 KEYS = "XYZABC"
 LETTER = np.isin(
@@ -58,23 +58,19 @@ class Components:
         return np.asarray(np.abs(change) <= self.half_step)
 
 
-class KrlWritePlan:
-    """A program, the plan for it, and what the writer looks up in them again and again.
+class KrlWritePlan(PlanRows):
+    """The rows of a program beside a plan, and what the writer looks up in them again and again.
 
-    own (N,): the motion of the plan that takes the text of each row; inserted (N,): how many are before it.
+    inserted (N,): how many motions of the plan are before each row's own.
     """
 
     def __init__(self, program: Program, plan: Plan, writing: WritingSettings) -> None:
         """Raises ValueError where the plan has not one motion with the text of every row."""
-        self.program, self.plan, self.writing = program, plan, writing
-        self.path: Toolpath = program.toolpath
+        super().__init__(program, plan, writing)
         self.places: KrlSourceMap = program.text
         self.documents: Sequence[Document] = program.documents
         self.raws = [np.frombuffer(document.raw, np.uint8) for document in program.documents]
         self.least = np.array([writing.mm] * 3 + [writing.deg] * 3)
-        self.own: Ints = np.flatnonzero(plan.own)
-        if not np.array_equal(plan.source[self.own], np.arange(len(self.path))):
-            raise ValueError("a plan needs one motion with the text of every row")
         self.inserted: Ints = np.diff(self.own, prepend=-1) - 1
         self.has_angle = np.zeros(len(self.path), dtype=bool)
         self.has_angle[[row for row, arc in self.places.arcs.items() if arc.has_angle]] = True
@@ -183,9 +179,5 @@ def other_literal(literal: bytes) -> tuple[float, int]:
 
 
 def written_decimals(literal: bytes) -> int:
-    """The decimals that a literal is written with, its exponent considered."""
-    if literal.startswith(b"'"):
-        return 0
-    mantissa, _, exponent = literal.upper().partition(b"E")
-    written = len(mantissa.partition(b".")[2].strip())
-    return min(max(written - int(exponent or b"0"), 0), MOST_DECIMALS)
+    """The decimals that a literal of KRL is written with: none of a binary or hexadecimal one."""
+    return 0 if literal.startswith(b"'") else decimals_of(literal)

@@ -6,20 +6,17 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from postproc.base.arrays import Bools, Ints, differs
-from postproc.base.batches import each_block, in_blocks
+from postproc.base.arrays import Bools
+from postproc.base.batches import in_blocks
 from postproc.base.document import Edit, Edits
 from postproc.base.findings import Finding
+from postproc.languages.core.plan_rows import blocks
 from postproc.languages.dialect import EditedTargets, Plan, Program, Role, WritingSettings
 from postproc.languages.krl.dependent_targets import DependentTargets
 from postproc.languages.krl.in_place import literal_edits, partial_edits
 from postproc.languages.krl.inserting import insertions
 from postproc.languages.krl.target_edits import FULL, single_edits
 from postproc.languages.krl.write_plan import KrlWritePlan
-from postproc.toolpath import Kind
-
-BLOCK = 1 << 14
-"""Rows that are worked on at a time."""
 
 
 def edit_targets(program: Program, plan: Plan, writing: WritingSettings) -> EditedTargets:
@@ -29,8 +26,11 @@ def edit_targets(program: Program, plan: Plan, writing: WritingSettings) -> Edit
     more than ``FULL``: defects of the caller.
     """
     task = KrlWritePlan(program, plan, writing)
-    touched, way = _touched(task)
-    _refuse_forbidden(task, touched, way)
+    for motions in blocks(np.flatnonzero(plan.role != Role.ORIGINAL)):
+        if (plan.sweep[motions] > FULL).any():
+            raise ValueError("an inserted arc is nearly a full turn: three points do not define it")
+    entered = {row for row in task.path.constraints.spline_headers if _enters(task, row)}
+    touched, way = task.touched(entered - task.path.constraints.refused.keys())
     held: dict[int, Finding] = {}
     edits = Edits.collected(_parts(task, touched, way, held))
     return EditedTargets((), held) if held else EditedTargets(edits)
@@ -61,46 +61,6 @@ def _parts(
 
     yield from in_blocks(written, len(touched))
     yield single
-
-
-def _touched(task: KrlWritePlan) -> tuple[Bools, Bools]:
-    """(N,) rows whose end is another one, and arcs whose path is."""
-    path, plan, n = task.path, task.plan, len(task.path)
-    touched, way = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-
-    def ends(rows: slice) -> None:
-        there = task.own[rows]
-        touched[rows] = differs(plan.position[there], path.position[rows]).any(axis=1)
-        touched[rows] |= differs(plan.rotation[there], path.rotation[rows]).any(axis=(1, 2))
-
-    each_block(ends, n)
-    for rows in _blocks(np.flatnonzero(path.kind == Kind.CIRC)):
-        there = task.own[rows]
-        for new, old in (
-            (plan.centre, path.arcs.centre),
-            (plan.normal, path.arcs.normal),
-            (plan.sweep, path.arcs.sweep),
-        ):
-            other = differs(new[there], old[rows])
-            way[rows] |= other.any(axis=1) if other.ndim > 1 else other
-    return touched, way
-
-
-def _refuse_forbidden(task: KrlWritePlan, touched: Bools, path_changes: Bools) -> None:
-    path = task.path
-    fixed = path.constraints
-    fixed_rows = {row for row in (*fixed.refused, *fixed.locked) if touched[row]}
-    fixed_rows |= {row for row in fixed.refused if path_changes[row]}
-    fixed_rows |= set(np.flatnonzero(touched & (path.kind == Kind.AXIS)).tolist())
-    if fixed_rows:
-        raise ValueError(f"motions that cannot be corrected are moved: rows {sorted(fixed_rows)[:5]}")
-    whole = {row for row in (*fixed.refused, *fixed.no_insert_before) if task.inserted[row]}
-    whole -= {row for row in fixed.spline_headers if _enters(task, row)} - fixed.refused.keys()
-    inserted = _blocks(np.flatnonzero(task.plan.role != Role.ORIGINAL))
-    if any((task.plan.sweep[motions] > FULL).any() for motions in inserted):
-        raise ValueError("an inserted arc is nearly a full turn: three points do not define it")
-    if whole:
-        raise ValueError(f"motions that cannot be divided are divided: rows {sorted(whole)[:5]}")
 
 
 def _enters(task: KrlWritePlan, row: int) -> bool:
@@ -136,8 +96,3 @@ def _partial(task: KrlWritePlan, private: Bools) -> Bools:
         _, where, counts = np.unique(words, return_inverse=True, return_counts=True)
         partial &= counts[where] == 1
     return np.asarray(partial)
-
-
-def _blocks(rows: Ints) -> Iterator[Ints]:
-    for at in range(0, len(rows), BLOCK):
-        yield rows[at : at + BLOCK]

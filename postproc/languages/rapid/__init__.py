@@ -5,17 +5,15 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from postproc.base.document import Document, Edit
-from postproc.languages.core.single_file import BEGIN, SingleFileDialect
+from postproc.base.document import Document
+from postproc.languages.core.dialect_defaults import BEGIN, DialectDefaults
 from postproc.languages.dialect import (
-    MARK,
     PLAIN,
     EditedTargets,
     Plan,
     Program,
     ReadingSettings,
     WritingSettings,
-    put_mark,
 )
 from postproc.languages.rapid import codes as codes
 
@@ -25,12 +23,13 @@ _MODULE = re.compile(
 _ROUTINE = re.compile(rb"^[ \t]*+(?:LOCAL[ \t]++)?PROC[ \t]++[A-Za-z][A-Za-z0-9_]*+[ \t]*+\(", re.I | re.M)
 
 
-class RapidDialect(SingleFileDialect):
+class RapidDialect(DialectDefaults):
     """RAPID as a ``Dialect``."""
 
     name = "rapid"
     family = "RAPID"
     suffixes: tuple[str, ...] = (".mod", ".modx", ".prg", ".sys", ".sysx")
+    comment = "!"
     letters = b"ABCDEFGHIJKLMNOPQRSTUVWXYZ\\;"  # of inserted motions, and of Offs and RelTool
 
     def claims(self, path: Path, raw: bytes) -> bool:
@@ -48,10 +47,3 @@ class RapidDialect(SingleFileDialect):
         from postproc.languages.rapid import target_writer
 
         return target_writer.edit_targets(program, plan, writing)
-
-    def marked(self, program: Program, text: str) -> Edit:
-        return put_mark(program, f"!{MARK}{text}".encode("latin-1", "replace"))
-
-    def renamed(self, program: Program, stem: str) -> list[Edit]:
-        """Nothing: a module keeps its name in a file of any name."""
-        return []

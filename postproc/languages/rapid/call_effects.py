@@ -6,11 +6,11 @@ from collections.abc import Iterable, Set
 from itertools import chain
 from typing import NamedTuple
 
-from postproc.languages.core.row_facts import SPEAKS
+from postproc.languages.core.comments_in_force import SPEAKS, VARYING
 from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.declared_data import Usage, walk
 from postproc.languages.rapid.instructions import DISPLACING, HALTING, MODES, WAITING
-from postproc.languages.rapid.program_state import VARYING, ProgramState
+from postproc.languages.rapid.program_state import ProgramState
 from postproc.languages.rapid.syntax_tree import (
     Expression,
     FunctionCall,

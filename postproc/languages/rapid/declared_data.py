@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from postproc.languages.core.reach import reached
 from postproc.languages.rapid.data_types import RECORDS, SPEEDS, STOP_KINDS, STOP_POINTS, ZONES, Components
 from postproc.languages.rapid.evaluation import Evaluator, Typed
 from postproc.languages.rapid.instructions import (
@@ -25,6 +26,7 @@ from postproc.languages.rapid.syntax_tree import (
     DataDeclaration,
     For,
     FunctionCall,
+    If,
     Index,
     Instruction,
     Label,
@@ -35,6 +37,8 @@ from postproc.languages.rapid.syntax_tree import (
     RapidRoutine,
     Statement,
     StringLiteral,
+    Test,
+    While,
 )
 from postproc.languages.rapid.values import FALSE, TRUE, GroupValue, Leaf, UnknownData, Value, number_of
 
@@ -203,14 +207,7 @@ class Usage:
 
     def reached(self, names: Iterable[bytes]) -> set[bytes]:
         """What calls of routines may run: these, and what they call."""
-        seen: set[bytes] = set()
-        pending = list(names)
-        while pending:
-            one = pending.pop()
-            if one not in seen:
-                seen.add(one)
-                pending += self._own if self.is_late(one) else self.calls.get(one, ())
-        return seen
+        return reached(names, lambda one: self._own if self.is_late(one) else self.calls.get(one, ()))
 
     @staticmethod
     def is_late(name: bytes) -> bool:
@@ -325,10 +322,15 @@ def _conditions(statement: Any) -> Iterator[Any]:
         yield values
 
 
+_WITH_BLOCKS = (If, While, For, Test)
+
+
 def walk(body: tuple[Any, ...]) -> Iterator[Any]:
     """All statements of a body, with those of its blocks."""
     for statement in body:
         yield statement
+        if not isinstance(statement, _WITH_BLOCKS):
+            continue
         for _, inner in getattr(statement, "branches", ()):
             yield from walk(inner)
         for _, inner in getattr(statement, "cases", ()):

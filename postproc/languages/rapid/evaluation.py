@@ -66,7 +66,7 @@ _COMPARISONS: dict[bytes, Callable[[float, float], bool]] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True, eq=False)
 class Evaluator:
     """``look``: the value and type of a name; ``records``: further types; ``shadowed``: functions of the program,
     whose names mean these."""

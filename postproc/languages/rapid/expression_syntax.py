@@ -29,6 +29,7 @@ _LEVELS: tuple[frozenset[bytes], ...] = (
     frozenset([b"+", b"-"]),
     frozenset([b"*", b"/", b"DIV", b"MOD"]),
 )
+_LEVEL_OF = {operator: level for level, operators in enumerate(_LEVELS) for operator in operators}
 _SUM = 3
 _NO_NAMES = frozenset(
     b"THEN DO FROM TO STEP WITH ENDIF ELSE ELSEIF ENDFOR ENDWHILE ENDTEST CASE DEFAULT ENDPROC ENDFUNC"
@@ -63,10 +64,11 @@ class RapidExpressionParser:
 
     def sign(self, text: bytes) -> bool:
         """Whether the next token is this sign, which is then passed."""
-        if self.next.kind == SIGN and self.next.text == text:
-            self.take()
-            return True
-        return False
+        token = self.tokens.next
+        if token.text != text or token.kind != SIGN:
+            return False
+        self.tokens.take()
+        return True
 
     def need(self, text: bytes) -> None:
         """Passes this sign.  Raises SyntaxProblem for another token."""
@@ -96,25 +98,27 @@ class RapidExpressionParser:
             self._depth -= 1
 
     def _level(self, level: int) -> Expression:
-        if level == len(_LEVELS):
-            return self._primary()
+        """An expression of operators of this level and of those that bind more."""
         start = self.next.start
-        left = self._signed(level) if level == _SUM else self._level(level + 1)
-        while self.next.kind in (SIGN, NAME) and self.next.text in _LEVELS[level]:
+        left = self._signed() if level <= _SUM else self._primary()
+        while (token := self.tokens.next).kind == SIGN or token.kind == NAME:
+            found = _LEVEL_OF.get(token.text, -1)
+            if found < level:
+                break
             operator = self.take().text
             if operator == b"AND" and _ends_with_not(left):
                 operator = AND_AFTER_NOT
-            right = self._level(level + 1)
+            right = self._level(found + 1)
             left = OperatorExpression(operator, (left, right), start, self.tokens.before)
         return left
 
-    def _signed(self, level: int) -> Expression:
-        """A sum, which may have a sign before it; that of a number belongs to the number."""
-        token = self.next
+    def _signed(self) -> Expression:
+        """What a sum starts with, which may have a sign before it; that of a number belongs to the number."""
+        token = self.tokens.next
         if token.kind != SIGN or token.text not in (b"+", b"-"):
-            return self._level(level + 1)
+            return self._primary()
         self.take()
-        operand = self._level(level + 1)
+        operand = self._level(_SUM + 1)
         if isinstance(operand, NumberLiteral):
             value = -operand.value if token.text == b"-" else operand.value
             return NumberLiteral(value, token.start, operand.stop)
@@ -181,6 +185,8 @@ class RapidExpressionParser:
     def suffixes(self, base: Expression) -> Expression:
         """``base`` with the indices and components after it.  Raises SyntaxProblem for too many."""
         start = base.start
+        if self.tokens.next.text not in (b"{", b"."):
+            return base
         for _ in range(DEEPEST):
             if self.sign(b"{"):
                 indices = [self.expression()]
@@ -198,8 +204,8 @@ class RapidExpressionParser:
         """Arguments up to the sign ``end``, which is not passed.  Raises SyntaxProblem where they are none."""
         found: list[Argument] = []
         separated = True
-        while not (self.next.kind == SIGN and self.next.text == end):
-            start = self.next.start
+        while not ((token := self.tokens.next).kind == SIGN and token.text == end):
+            start = token.start
             if self.sign(b"\\"):
                 name = self.name()
                 value = None
@@ -211,7 +217,6 @@ class RapidExpressionParser:
             else:
                 if not separated:
                     raise SyntaxProblem
-                token = self.next
                 if self.sign(b"*"):
                     found.append(Argument(b"", Star(token.start, token.stop), start, self.tokens.before))
                 else:

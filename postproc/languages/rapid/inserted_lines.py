@@ -8,10 +8,10 @@ import numpy as np
 
 from postproc.base.decimals import fixed_one
 from postproc.base.document import Edit, Span
-from postproc.languages.core.plan_rows import blocks
+from postproc.languages.core.plan_rows import PlannedNumbers, blocks
 from postproc.languages.dialect import Role
 from postproc.languages.rapid.data_types import FLY_BY
-from postproc.languages.rapid.plan_writer import PlanWriter, PointNumbers, aggregate
+from postproc.languages.rapid.plan_writer import PlanWriter, aggregate
 from postproc.languages.rapid.target_places import MotionText, PointText, in_one_line
 from postproc.toolpath import Kind
 
@@ -35,7 +35,7 @@ def insertions(task: PlanWriter) -> tuple[list[Edit], dict[int, str]]:
             point = text.target
             if point is None:
                 raise ValueError(f"row {row} has no target")
-            numbers = PointNumbers(said[k].tolist(), wanted[k].tolist(), task.decimals(point, 7))
+            numbers = PlannedNumbers(said[k].tolist(), wanted[k].tolist(), task.decimals(point, 7))
             words = point.words
             if external is not None:
                 words = _external(task, words, external[k].tolist(), task.path.external[row].tolist())

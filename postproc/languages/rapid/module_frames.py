@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
+from postproc.languages.core.frame_table import FrameTable
 from postproc.languages.rapid.motion_facts import FrameUse, Problem, item_of, reason_of
 from postproc.languages.rapid.quaternions import rotation_from_quaternion
 from postproc.languages.rapid.values import Leaf, UnknownData, Value, numbers_of, truth_of
@@ -18,22 +19,21 @@ from postproc.toolpath.initial_state import Symbol
 _KEYS = ("X", "Y", "Z", "A", "B", "C")
 
 
-class ModuleFrames:
+class ModuleFrames(FrameTable):
     """The frames that motions use, each once.  ``symbols``: what the cell states of names that the file does not
     declare: the number of a tool or base of the cell, or a pose; ``written``: names that the program assigns."""
 
     def __init__(
         self, symbols: Mapping[str, Symbol], lines: Mapping[bytes, int], written: Set[bytes] = frozenset()
     ) -> None:
-        self.refs: list[FrameRef] = []
+        super().__init__()
         self._written = written
         self._symbols, self._lines = symbols, lines
-        self._known: dict[tuple[object, ...], int] = {}
 
     def tool(self, use: FrameUse, line: int) -> int | Problem:
         """Index of a tool, or why it is not known."""
         if self._name(use) == b"TOOL0":
-            return self._index(("tool", 0), FrameRef(0, None, line))
+            return self.index(("tool", 0), lambda: FrameRef(0, None, line))
         bound = self._bound("tool", use, line)
         if bound is not None:
             return bound
@@ -48,7 +48,7 @@ class ModuleFrames:
     def base(self, use: FrameUse, line: int) -> int | Problem:
         """Index of a work object: user frame x object frame; or why it is not known."""
         if self._name(use) == b"WOBJ0":
-            return self._index(("base", 0), FrameRef(0, None, line))
+            return self.index(("base", 0), lambda: FrameRef(0, None, line))
         bound = self._bound("base", use, line)
         if bound is not None:
             return bound
@@ -77,7 +77,7 @@ class ModuleFrames:
                     "RAP005",
                     f"the cell states {symbol:g} for {_shown(name)}, which is no number of a frame",
                 )
-            return self._index((kind, int(symbol)), FrameRef(int(symbol), None, line))
+            return self.index((kind, int(symbol)), lambda: FrameRef(int(symbol), None, line))
         if set(symbol) != set(_KEYS):
             return "RAP005", f"the cell does not state X, Y, Z, A, B, C of {_shown(name)}"
         values = np.array([symbol[key] for key in _KEYS])
@@ -101,13 +101,7 @@ class ModuleFrames:
 
     def _posed(self, kind: str, pose: Poses, line: int) -> int:
         key = (kind, *pose.position.tolist(), *pose.rotation.ravel().tolist())
-        return self._index(key, FrameRef(None, pose, line))
-
-    def _index(self, key: tuple[object, ...], frame: FrameRef) -> int:
-        if key not in self._known:
-            self._known[key] = len(self.refs)
-            self.refs.append(frame)
-        return self._known[key]
+        return self.index(key, lambda: FrameRef(None, pose, line))
 
 
 def _pose(value: Value) -> Poses | None:

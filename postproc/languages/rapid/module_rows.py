@@ -10,15 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.base.arrays import Bools, Floats, Ints, shared, sums
+from postproc.base.arrays import Floats, Ints, shared, sums
+from postproc.base.batches import blocks
 from postproc.base.document import Document
-from postproc.languages.core.motion_sources import Meeting, Source, distinguished, expanded
+from postproc.languages.core.comments_in_force import CONTRADICTED, VARYING
+from postproc.languages.core.motion_sources import ELSEWHERE, Meeting, Source, distinguished, expanded
 from postproc.languages.rapid.data_types import ABSENT
 from postproc.languages.rapid.declared_data import walk
 from postproc.languages.rapid.instructions import MOTIONS, OTHER_MOTIONS
 from postproc.languages.rapid.module_frames import ModuleFrames
 from postproc.languages.rapid.motion_facts import MotionFact, Problem, item_of, not_read, reason_of
-from postproc.languages.rapid.program_state import ELSEWHERE, VARYING, ProgramState
+from postproc.languages.rapid.program_state import ProgramState
 from postproc.languages.rapid.propagation import OTHER, Propagation
 from postproc.languages.rapid.quaternions import WORST
 from postproc.languages.rapid.syntax_tree import Instruction, PlainMotions, RapidRoutine
@@ -36,6 +38,7 @@ from postproc.toolpath.initial_state import Symbol
 
 FARTHEST = 1e7
 """[mm]"""
+_UNKNOWN, _LENGTH, _FAR, _VIA = (np.uint8(bit) for bit in (1, 2, 4, 8))
 
 
 @dataclass(slots=True)
@@ -127,8 +130,9 @@ def module_rows(
     bounds = rows.first.tolist()[len(flow.facts) :]
     for (_, problem), start, stop in zip(never, bounds[:-1], bounds[1:], strict=True):
         rows.refuse_all(range(start, stop), problem)
+    odd = _odd_targets(rows)
     for start, stop, fact in rows.each():
-        _place(rows, frames, range(start, stop), fact)
+        _place(rows, frames, range(start, stop), fact, odd)
     _external(rows)
     return rows, frames
 
@@ -244,13 +248,15 @@ def _why(flow: Propagation, routine: RapidRoutine, handlers: bool) -> Problem:
     return "RAP009", "the flow that the program's constants define does not reach it"
 
 
-def _place(rows: ModuleRows, frames: ModuleFrames, these: range, fact: MotionFact) -> None:
-    """Frames, axes and configuration of the rows of a fact."""
+def _place(
+    rows: ModuleRows, frames: ModuleFrames, these: range, fact: MotionFact, odd: NDArray[np.uint8]
+) -> None:
+    """Frames, axes and configuration of the rows of a fact; odd: see ``_odd_targets``."""
     first = these.start
     line = int(rows.lines[first])
     problem = fact.problem
     if problem is None and (fact.force is VARYING or fact.switch is VARYING):
-        problem = "RAP006", "the FORCE or COMPENSATE comment in force differs with the path of the program"
+        problem = "RAP006", CONTRADICTED
     if problem is not None:
         rows.refuse_all(these, problem)
     if fact.arguments is None:
@@ -261,7 +267,7 @@ def _place(rows: ModuleRows, frames: ModuleFrames, these: range, fact: MotionFac
     if fact.form.kind == Kind.AXIS:
         _place_axes(rows, first, fact)
     else:
-        _check_targets(rows, these, fact)
+        _check_targets(rows, these, fact, odd)
         for found in (found_tool, found_base):
             if not isinstance(found, int):
                 rows.refuse_all(these, found)
@@ -295,19 +301,30 @@ def _place_configurations(rows: ModuleRows, these: range, fact: MotionFact) -> N
         rows.quadrants[part], rows.cfx[part] = each[fact.lines.which].T
 
 
-def _check_targets(rows: ModuleRows, these: range, fact: MotionFact) -> None:
-    numbers = rows.numbers[these.start : these.stop]
-    unknown: Bools = np.asarray(np.isnan(numbers).any(axis=1))
-    size = np.sqrt((numbers[:, 3:] ** 2).sum(axis=1))
-    wrong: Bools = unknown | ~(np.abs(size - 1.0) <= WORST)
-    for k in np.flatnonzero(wrong).tolist():
-        if unknown[k]:
-            rows.refuse(these[k], *_lost(fact.target))
-        else:
-            rows.refuse(these[k], "RAP004", "the quaternion of its target is not of length 1")
-    for k in np.flatnonzero(np.abs(numbers[:, :3]).max(axis=1) >= FARTHEST).tolist():
-        rows.refuse(these[k], "RAP002", "its target is farther away than 10 km")
-    if fact.via is not None and np.isnan(rows.vias[these.start]).any():
+def _odd_targets(rows: ModuleRows) -> NDArray[np.uint8]:
+    """(N,) what is wrong with a target, as bits: not known, a quaternion of another length, far, an unknown via."""
+    found = np.zeros(len(rows), np.uint8)
+    for part in blocks(len(rows)):
+        numbers = rows.numbers[part]
+        unknown = np.isnan(numbers).any(axis=1)
+        size = np.sqrt((numbers[:, 3:] ** 2).sum(axis=1))
+        found[part] = unknown * _UNKNOWN | ~(unknown | (np.abs(size - 1.0) <= WORST)) * _LENGTH
+        found[part] |= (np.abs(numbers[:, :3]).max(axis=1) >= FARTHEST) * _FAR
+        found[part] |= np.isnan(rows.vias[part]).any(axis=1) * _VIA
+    return found
+
+
+def _check_targets(rows: ModuleRows, these: range, fact: MotionFact, odd: NDArray[np.uint8]) -> None:
+    found = odd[these.start : these.stop]
+    for row in these if len(these) == 1 else (these.start + np.flatnonzero(found & ~_VIA)).tolist():
+        wrong = int(odd[row])
+        if wrong & _UNKNOWN:
+            rows.refuse(row, *_lost(fact.target))
+        elif wrong & _LENGTH:
+            rows.refuse(row, "RAP004", "the quaternion of its target is not of length 1")
+        if wrong & _FAR:
+            rows.refuse(row, "RAP002", "its target is farther away than 10 km")
+    if fact.via is not None and odd[these.start] & _VIA:
         message = f"its auxiliary point is not known: {reason_of(fact.via, 'it is computed')}"
         rows.refuse(these.start, "RAP012", message)
 

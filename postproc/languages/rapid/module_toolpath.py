@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
 from postproc.base.arrays import Bools, FewRows, Floats, Ints
 from postproc.base.document import Document
 from postproc.base.findings import Finding
-from postproc.base.geometry import Poses, arc_through
-from postproc.base.units import DEG, MM
+from postproc.base.geometry import Poses
+from postproc.base.units import MM
+from postproc.languages.core.comments_in_force import VARYING, Varying
 from postproc.languages.core.motion_sources import Meeting, Source
-from postproc.languages.core.row_facts import OTHER_PATHS, follow_on, grouped, moving_external, only_used
+from postproc.languages.core.row_facts import (
+    OTHER_PATHS,
+    LockedRows,
+    axis_targets,
+    circles,
+    follow_on,
+    grouped,
+    moving_external,
+    only_used,
+)
 from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.module_frames import ModuleFrames
 from postproc.languages.rapid.module_rows import ModuleRows, module_rows
-from postproc.languages.rapid.program_state import VARYING, Varying
 from postproc.languages.rapid.propagation import Propagation
 from postproc.languages.rapid.quaternions import rotation_from_quaternion
 from postproc.languages.rapid.remarks import put_remarks
@@ -64,11 +74,7 @@ def module_toolpath(
             kind=kind,
             position=position,
             rotation=_rotations(rows.numbers[:, 3:]),
-            axes=FewRows(
-                np.array(sorted(rows.axes), np.int32),
-                np.array([rows.axes[row] for row in sorted(rows.axes)]).reshape(-1, 6) * DEG,
-                n,
-            ),
+            axes=axis_targets(rows.axes, n),
             base=rows.base,
             tool=rows.tool,
             frames=tuple(frames.refs),
@@ -159,19 +165,9 @@ def _arcs(rows: ModuleRows, frames: ModuleFrames, position: Floats, kind: Ints) 
     for k, row in enumerate(at.tolist()):
         starts[k] = _arc_start(rows, frames, rows.before(row), row, position)
     vias = rows.vias[at] * MM
-    centre, normal, sweep = arc_through(starts, vias, position[at])
-    near = np.min(
-        [
-            np.linalg.norm(a - b, axis=1)
-            for a, b in ((starts, vias), (vias, position[at]), (starts, position[at]))
-        ],
-        axis=0,
-    )
-    with np.errstate(invalid="ignore"):
-        lost = ~np.isfinite(sweep) | ~np.isfinite(centre).all(axis=1) | (near < SHORTEST)
-    for row in at[lost].tolist():
+    centre, normal, sweep = circles(starts, vias, position[at], SHORTEST)
+    for row in at[np.isnan(sweep)].tolist():
         rows.refuse(row, "RAP012", "its points define no circle that is known")
-    centre[lost], normal[lost], sweep[lost] = np.nan, np.nan, np.nan
     columns = [np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full(n, np.nan)]
     for column, values in zip(columns, (centre, normal, sweep), strict=True):
         column[at] = values
@@ -237,11 +233,16 @@ def _no_insert_before(
         for row in range(start, stop) if why or wordless else [start]:
             no_insert_before[row] = why or wordless
         if not why and fact.checked is not False:
-            for row in (start + np.flatnonzero(~same[start:stop])).tolist():
-                no_insert_before[row] = OTHER_QUADRANTS
-        for row in (start + np.flatnonzero(~continues[start:stop])).tolist():
-            no_insert_before[row] = OTHER_PATHS
+            no_insert_before.update(dict.fromkeys(_without(same, start, stop), OTHER_QUADRANTS))
+        no_insert_before.update(dict.fromkeys(_without(continues, start, stop), OTHER_PATHS))
     return {row: why for row, why in no_insert_before.items() if why and row not in refused}
+
+
+def _without(mask: Bools, start: int, stop: int) -> list[int]:
+    """The rows from ``start`` to before ``stop`` for which ``mask`` does not hold; most often it is one."""
+    if stop == start + 1:
+        return [] if mask[start] else [start]
+    return [start + row for row in np.flatnonzero(~mask[start:stop]).tolist()]
 
 
 def _locked(
@@ -251,20 +252,15 @@ def _locked(
     refused: Mapping[int, Finding],
 ) -> dict[int, Finding]:
     """Rows from whose end a refused arc starts, or where the program reads the position."""
-    locked: dict[int, Finding] = {}
+    locked = LockedRows(partial(_finding, document, rows), "RAP012", "RAP002")
     seen: set[Meeting] = set()
     for row in refused:
-        if rows.fact(row).form.kind != Kind.CIRC:
-            continue
-        for one in rows.starts_of(row, seen):
-            message = f"the arc in line {rows.lines[row]} starts at this end point and is not corrected"
-            locked.setdefault(one, _finding(document, rows, one, "RAP012", message))
+        if rows.fact(row).form.kind == Kind.CIRC:
+            locked.start_arc(rows.starts_of(row, seen), int(rows.lines[row]))
     seen = set()
     for at, places in sorted(flow.reads.items()):
-        for one in rows.rows_of(places, seen):
-            message = f"line {document.place(at)[0]} reads the end position of this motion"
-            locked.setdefault(one, _finding(document, rows, one, "RAP002", message))
-    return dict(sorted(locked.items()))
+        locked.are_read(rows.rows_of(places, seen), document.place(at)[0])
+    return locked.done()
 
 
 def _finding(document: Document, rows: ModuleRows, row: int, code: str, message: str) -> Finding:

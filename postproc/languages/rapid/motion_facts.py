@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from postproc.languages.core.comments_in_force import CONTRADICTED, VARYING, Varying
+from postproc.languages.core.field_joins import SOMETIMES, FieldJoins, either, lost
 from postproc.languages.core.motion_sources import Meeting, Source, met
 from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.data_types import STOP_KINDS
@@ -18,7 +20,7 @@ from postproc.languages.rapid.instructions import (
     sort_arguments,
     switch_value,
 )
-from postproc.languages.rapid.program_state import VARYING, ProgramState, Varying
+from postproc.languages.rapid.program_state import ProgramState
 from postproc.languages.rapid.syntax_tree import Argument, Index, Instruction, Name, PlainMotions, Remark
 from postproc.languages.rapid.values import (
     Leaf,
@@ -84,35 +86,39 @@ class MotionFact:
 
     def joined(self, other: MotionFact, meeting: Meeting) -> MotionFact:
         """What holds in both executions; meeting: that of what runs before them."""
-        via = self.via
-        if via is not None:
-            via = UnknownData(DIFFERS) if other.via is None else joined(via, other.via, DIFFERS)
-        return replace(
-            self,
-            target=joined(self.target, other.target, DIFFERS),
-            via=via,
-            tool=_of_both(self.tool, other.tool),
-            base=_of_both(self.base, other.base),
-            speed=self.speed if self.speed == other.speed else NAN,
-            zone=self.zone if self.zone == other.zone else NAN,
-            stops=self.stops and other.stops,
-            orientation=self.orientation
-            if self.orientation == other.orientation
-            else OrientationMode.UNKNOWN,
-            arc=self.arc if self.arc == other.arc else ArcFrame.UNKNOWN,
-            before=met(self.before, other.before, meeting),
-            force=self.force if self.force == other.force else VARYING,
-            switch=self.switch if self.switch == other.switch else VARYING,
-            problem=self.problem or other.problem,
-            checked=self.checked if self.checked == other.checked else None,
-            waits=self.waits if self.waits == other.waits else Waits.MAYBE,
-        )
+        changed = _JOINS.changes(self, other)
+        return replace(self, before=met(self.before, other.before, meeting), **changed)
 
 
 def _of_both(one: FrameUse, other: FrameUse) -> FrameUse:
-    if one == other:
-        return one
     return FrameUse(one.name if one.name == other.name else b"", joined(one.value, other.value, DIFFERS))
+
+
+def _point(one: Value | None, other: Value | None) -> Value | None:
+    """A target, or an auxiliary point, which a motion has or has not."""
+    if one is None:
+        return None
+    return UnknownData(DIFFERS) if other is None else joined(one, other, DIFFERS)
+
+
+_JOINS = FieldJoins(
+    {
+        "target": _point,
+        "via": _point,
+        "tool": _of_both,
+        "base": _of_both,
+        "speed": lost(NAN),
+        "zone": lost(NAN),
+        "stops": lost(False),
+        "orientation": lost(OrientationMode.UNKNOWN),
+        "arc": lost(ArcFrame.UNKNOWN),
+        "force": lost(VARYING),
+        "switch": lost(VARYING),
+        "problem": either,
+        "checked": lost(None),
+        "waits": SOMETIMES,
+    }
+)
 
 
 def motion_fact(
@@ -194,7 +200,7 @@ def _problem(state: ProgramState, options: dict[bytes, Argument]) -> Problem | N
     if b"ID" in options:
         return "RAP014", "it is synchronised with another robot or positioner (\\ID)"
     if state.force is VARYING or state.switch is VARYING:
-        return "RAP006", "the FORCE or COMPENSATE comment in force differs with the path of the program"
+        return "RAP006", CONTRADICTED
     return None
 
 

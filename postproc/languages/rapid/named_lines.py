@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.base.arrays import Ints
-from postproc.base.decimals import literals
+from postproc.base.decimals import literals, other_literal
 from postproc.base.document import offset_type
 from postproc.languages.rapid.plain_lines import (
     BLANK,
@@ -28,7 +28,6 @@ from postproc.languages.rapid.plain_lines import (
     WORDS,
     each_number,
     number_places,
-    other_literal,
 )
 from postproc.languages.rapid.syntax_tree import Instruction, PlainMotions, PlainPlaces
 

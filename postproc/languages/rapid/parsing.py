@@ -56,6 +56,7 @@ class ModuleParser(RapidExpressionParser):
         self.raw, self._without = raw, without
         self.module = Module()
         self._remarks = 0  # comments that are in the tree
+        self._line_start = 0  # of the line of the last of them
         self._broken = -1
         self._plain = PlainReader(raw) if fast else None
         self._named = NamedReader(raw, without) if fast else None
@@ -414,7 +415,9 @@ class ModuleParser(RapidExpressionParser):
         comments = self.tokens.comments
         while self._remarks < len(comments) and comments[self._remarks][0] < stop:
             start, end = comments[self._remarks]
-            line = self.raw[max(self.raw.rfind(b"\n", 0, start), self.raw.rfind(b"\r", 0, start)) + 1 : start]
+            ends = (self.raw.rfind(mark, self._line_start, start) for mark in (b"\n", b"\r"))
+            self._line_start = max(self._line_start, max(ends) + 1)  # looked for from the last comment on
+            line = self.raw[self._line_start : start]
             text = self.raw[start + 1 : end].decode("latin-1").strip()
             found.append(Remark(text, not line.removeprefix(BOM_UTF8).strip(), start))
             self._remarks += 1

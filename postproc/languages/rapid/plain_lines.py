@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from postproc.base.array_storage import ArrayStore
 from postproc.base.arrays import Ints
-from postproc.base.decimals import MOST_DECIMALS, literals
+from postproc.base.decimals import literals, other_literal
 from postproc.base.document import offset_type
 from postproc.languages.rapid.syntax_tree import Instruction, PlainMotions, PlainPlaces
 
@@ -115,15 +115,3 @@ def number_places(text: NDArray[np.uint8], begins: Ints) -> tuple[Ints, Ints]:
     first, after = edges[0::2], edges[1::2]
     each = np.searchsorted(first, begins)[:, None] + np.arange(CORRECTED)
     return first[each], after[each]
-
-
-def other_literal(literal: bytes) -> tuple[float, int]:
-    """Value and decimals of a literal in any form."""
-    return float(literal), decimals_of(literal)
-
-
-def decimals_of(literal: bytes) -> int:
-    """The decimals that a literal is written with, its exponent considered."""
-    mantissa, _, exponent = literal.upper().partition(b"E")
-    written = len(mantissa.partition(b".")[2].strip())
-    return min(max(written - int(exponent or b"0"), 0), MOST_DECIMALS)

@@ -2,35 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from postproc.base.arrays import Floats, Ints
-from postproc.base.decimals import fixed_one
+from postproc.base.decimals import decimals_of
 from postproc.base.units import DEG, MM
-from postproc.languages.core.plan_rows import ArcLimits, PlanRows
+from postproc.languages.core.plan_rows import ArcLimits, PlannedNumbers, PlanRows
 from postproc.languages.dialect import Plan, Program, WritingSettings
-from postproc.languages.rapid.plain_lines import decimals_of
 from postproc.languages.rapid.quaternions import quaternion_from_rotation
 from postproc.languages.rapid.target_places import MotionText, PointText, RapidSourceMap
 
 FINER = 2
 """Decimals of a quaternion beyond those of an angle in degrees: a half of the last one turns by less than it."""
-
-
-class PointNumbers(NamedTuple):
-    """A point: what the text says, what is wanted (3 or 7 numbers) [mm, 1], and the decimals of each."""
-
-    own: list[float]
-    wanted: list[float]
-    decimals: list[int]
-
-    def changed(self) -> list[int]:
-        """The numbers that differ by more than half a written step."""
-        return [
-            i
-            for i, (own, wanted, count) in enumerate(zip(self.own, self.wanted, self.decimals, strict=True))
-            if not abs(wanted - own) <= 0.5 * 10.0**-count
-        ]
 
 
 class PlanWriter(PlanRows):
@@ -63,13 +44,11 @@ class PlanWriter(PlanRows):
             for spot, least in zip(point.spots[:count], self.least[:count], strict=True)
         ]
 
-    def spelt(self, point: PointText, numbers: PointNumbers) -> list[bytes]:
+    def spelt(self, point: PointText, numbers: PlannedNumbers) -> list[bytes]:
         """The numbers as they are to be written; those that stay as they are."""
         changed = set(numbers.changed())
         return [
-            self.literal(spot).lstrip(b"+")
-            if i not in changed and spot[0] >= 0
-            else fixed_one(numbers.wanted[i], numbers.decimals[i])
+            self.literal(spot).lstrip(b"+") if i not in changed and spot[0] >= 0 else numbers.literal(i)
             for i, spot in enumerate(point.spots[: len(numbers.wanted)])
         ]
 

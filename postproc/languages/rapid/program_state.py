@@ -3,26 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from enum import IntEnum
 
-from postproc.languages.core.motion_sources import Meeting, Source, met
+from postproc.languages.core.comments_in_force import VARYING, Varying
+from postproc.languages.core.field_joins import SOMETIMES, FieldJoins, either, lost
+from postproc.languages.core.motion_sources import START, Meeting, Source, met
 from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.syntax_tree import Remark
 from postproc.languages.rapid.values import UnknownData, Value, joined
 from postproc.toolpath import ArcFrame, OrientationMode
-
-START, ELSEWHERE = -1, -2
-"""In the place of a motion: the start of the program; what the program does not contain."""
-
-
-class Varying(IntEnum):
-    """In the place of what is in force: it differs with the path of the program."""
-
-    VARYING = 0
-
-
-VARYING = Varying.VARYING
 
 
 class _ValuesDiffer(Exception):
@@ -66,35 +55,36 @@ class ProgramState:
 
     def is_same(self, other: ProgramState) -> bool:
         """Whether the same holds in both."""
-        return _set_apart(self) == _set_apart(other) and same_values(self.values, other.values)
+        apart = self.last == other.last and _JOINS.values(self) == _JOINS.values(other)
+        return apart and same_values(self.values, other.values)
 
     def join(self, other: ProgramState, meeting: Meeting) -> bool:
         """Takes in what holds where another path meets this one, at the place of ``meeting``; whether anything
         changed."""
-        before = self.values, _set_apart(self)
-        self.values = self.values.merged(other.values, _of_paths)
-        self.last = met(self.last, other.last, meeting)
-        self.displaced |= other.displaced
-        self.override = self.override if self.override == other.override else None
-        if self.orientation != other.orientation:
-            self.orientation = OrientationMode.UNKNOWN
-        self.arc = self.arc if self.arc == other.arc else ArcFrame.UNKNOWN
-        self.force = self.force if self.force == other.force else VARYING
-        self.switch = self.switch if self.switch == other.switch else VARYING
-        if self.checks_linear != other.checks_linear:
-            self.checks_linear = None
-        self.checks_joint = self.checks_joint if self.checks_joint == other.checks_joint else None
-        self.waits = self.waits if self.waits == other.waits else Waits.MAYBE
-        self.concurrent |= other.concurrent
-        return self.values is not before[0] or _set_apart(self) != before[1]
+        changed = _JOINS.changes(self, other)
+        values, last = self.values.merged(other.values, _of_paths), met(self.last, other.last, meeting)
+        if not changed and values is self.values and last == self.last:
+            return False
+        self.values, self.last = values, last
+        for name, value in changed.items():
+            setattr(self, name, value)
+        return True
 
 
-def _set_apart(state: ProgramState) -> tuple[object, ...]:
-    """What holds but for values."""
-    return (
-        state.last, state.displaced, state.override, state.orientation, state.arc, state.force, state.switch,
-        state.checks_linear, state.checks_joint, state.waits, state.concurrent,
-    )  # fmt: skip
+_JOINS = FieldJoins(
+    {
+        "displaced": frozenset.union,
+        "override": lost(None),
+        "orientation": lost(OrientationMode.UNKNOWN),
+        "arc": lost(ArcFrame.UNKNOWN),
+        "force": lost(VARYING),
+        "switch": lost(VARYING),
+        "checks_linear": lost(None),
+        "checks_joint": lost(None),
+        "waits": SOMETIMES,
+        "concurrent": either,
+    }
+)
 
 
 def _of_paths(name: bytes, one: Value | None, other: Value | None) -> Value:

@@ -10,13 +10,14 @@ from collections import defaultdict
 from collections.abc import Set
 from dataclasses import replace
 
-from postproc.languages.core.motion_sources import Meeting, Source
+from postproc.languages.core.comments_in_force import VARYING, Varying, place_of
+from postproc.languages.core.flow_runner import FlowRunner
+from postproc.languages.core.motion_sources import ELSEWHERE, START, Meeting, Source
 from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.call_effects import CallEffects, ModeChanges, leaving_words, mode_changes
 from postproc.languages.rapid.declared_data import DeclaredData, Usage, first_value, names_in, walk
 from postproc.languages.rapid.evaluation import Evaluator, is_component, unknown_record
-from postproc.languages.rapid.flow_graph import FlowGraph, Step
 from postproc.languages.rapid.instructions import (
     ANY_PROCEDURE,
     DISPLACING,
@@ -31,10 +32,10 @@ from postproc.languages.rapid.instructions import (
     is_motion,
 )
 from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read, override_of, waits_at
-from postproc.languages.rapid.program_state import ELSEWHERE, START, VARYING, ProgramState, Varying
+from postproc.languages.rapid.program_state import ProgramState
 from postproc.languages.rapid.routine_entries import program_entries, run_again, run_aside, value_at_start
+from postproc.languages.rapid.routine_graph import RapidStep, RoutineGraph
 from postproc.languages.rapid.routine_names import RoutineNames
-from postproc.languages.rapid.routine_runner import RoutineRunner
 from postproc.languages.rapid.syntax_tree import (
     Argument,
     AssignmentStatement,
@@ -94,7 +95,7 @@ class Propagation:
         self.unread: dict[int, NotUnderstood] = {}
         self._strayed = frozenset([ELSEWHERE] if self.usage.strays else [])
         self._again: set[bytes] = set()  # routines of which not each run is followed
-        self._graphs: dict[bytes, FlowGraph] = {}
+        self._graphs: dict[bytes, RoutineGraph] = {}
         self._effects = CallEffects(self.usage)
         self._names = RoutineNames(self.data, self.usage)
         self._changes: dict[bytes, ModeChanges] = {}
@@ -108,7 +109,7 @@ class Propagation:
         self.rows = 0
         self.waited: set[Source] = set()
         self._steps = MOST_STEPS + 4 * sum(_length(one) for r in module.routines for one in walk(r.body))
-        self._runner = RoutineRunner(self._after, lambda: len(self._names.aliased))
+        self._runner = FlowRunner(self._after, lambda: len(self._names.aliased))
 
     def run(self) -> None:
         """Follows the program from main, and every routine that nothing in the file calls.  Raises TooLong."""
@@ -121,12 +122,12 @@ class Propagation:
 
     def is_unclear(self, routine: RapidRoutine) -> bool:
         """Whether the structure of a routine is not understood, or its name is that of several."""
-        return routine.broken >= 0 or routine.name in self.ambiguous or self._graph(routine).missing
+        return routine.broken >= 0 or routine.name in self.ambiguous or bool(self._graph(routine).missing)
 
-    def _graph(self, routine: RapidRoutine) -> FlowGraph:
+    def _graph(self, routine: RapidRoutine) -> RoutineGraph:
         graph = self._graphs.get(routine.name)
         if graph is None:
-            graph = self._graphs[routine.name] = FlowGraph(routine.body)
+            graph = self._graphs[routine.name] = RoutineGraph(routine.body)
         return graph
 
     def _enter(self, routine: RapidRoutine, is_main: bool, is_aside: bool) -> None:
@@ -200,7 +201,7 @@ class Propagation:
         finally:
             self._names.active.pop()
 
-    def _after(self, graph: FlowGraph, at: int, state: ProgramState) -> list[tuple[int, ProgramState]]:
+    def _after(self, graph: RoutineGraph, at: int, state: ProgramState) -> list[tuple[int, ProgramState]]:
         """Where a block leads, and what holds there."""
         block = graph.blocks[at]
         for step in block.steps:
@@ -213,7 +214,7 @@ class Propagation:
             return [(block.follow, state), (block.otherwise, state)]
         return [(block.follow if holds else block.otherwise, state)]
 
-    def _step(self, step: Step, state: ProgramState) -> None:
+    def _step(self, step: RapidStep, state: ProgramState) -> None:
         self._steps -= _length(step)
         if self._steps < 0:
             raise TooLong
@@ -225,7 +226,7 @@ class Propagation:
             case AssignmentStatement():
                 self._functions(step.target, state)
                 self._functions(step.value, state)
-                self._assign(step.target, self._evaluator(state).value(step.value), state)
+                self._assign(step.target, step.value, state)
             case DataDeclaration():
                 if step.value is not None:
                     self._functions(step.value, state)
@@ -256,8 +257,7 @@ class Propagation:
     def _remark(self, step: Remark, state: ProgramState) -> None:
         if self._runner.recording:
             self.passed.setdefault(step.start, (step, self.rows))
-        word = step.text.split(" ")[0].split("\t")[0].split(",")[0].upper()
-        if place := {"FORCE": "force", "COMPENSATE": "switch"}.get(word):
+        if place := place_of(step.text):
             if self.preceding.setdefault(step.start, before := getattr(state, place)) != before:
                 self.preceding[step.start] = VARYING
             setattr(state, place, step)
@@ -427,8 +427,9 @@ class Propagation:
             if one.name in READERS:
                 self._note_reading(one.start, state)
 
-    def _assign(self, target: Expression, value: Value, state: ProgramState) -> None:
+    def _assign(self, target: Expression, expression: Expression, state: ProgramState) -> None:
         evaluator = self._evaluator(state)
+        value = evaluator.value(expression)
         variable, place = evaluator.assigned_place(target)
         if variable is None:
             return
@@ -438,10 +439,9 @@ class Propagation:
         old, kind = self._names.look(variable, state)
         if isinstance(old, UnknownData) and is_component(target):
             old = unknown_record(kind, evaluator.components, old)
-        new = value
         if isinstance(value, UnknownData) and NOT_CONSTANT not in value.reason:
-            new = UnknownData(f"{shown}{NOT_CONSTANT}{value.reason}")
-        changed = replaced(old, place, new, f"a part of {shown} is assigned that is not known")
+            value = UnknownData(f"{shown}{NOT_CONSTANT}{value.reason}")
+        changed = replaced(old, place, value, f"a part of {shown} is assigned that is not known")
         state.put(key, changed)
 
     def _evaluator(self, state: ProgramState) -> Evaluator:

@@ -7,7 +7,7 @@ import re
 from postproc.base.byte_search import find_word
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
-from postproc.languages.core.row_facts import SPEAKS
+from postproc.languages.core.comments_in_force import SPEAKS, ShownComments
 from postproc.languages.dialect import MARK
 from postproc.languages.rapid.declared_data import walk
 from postproc.languages.rapid.module_rows import ModuleRows
@@ -31,25 +31,21 @@ def put_remarks(
     for order, (remark, row) in enumerate(flow.passed.values()):
         if SPEAKS.match(remark.text):
             notes.append((row, order, _annotation(document, row, remark)))
-    shown: dict[str, Remark | None] = {"FORCE": None, "COMPENSATE": None}
+    shown = ShownComments()
     passed = iter(flow.passed.values())
     coming = next(passed, None)
     for row, stop, fact in rows.each():
         while coming is not None and coming[1] <= row:
-            word = SPEAKS.match(coming[0].text)
-            if word is not None:
-                shown[word[0].upper()] = coming[0]
+            shown.add(coming[0])
             coming = next(passed, None)
-        for word_, remark_or_none in (("FORCE", fact.force), ("COMPENSATE", fact.switch)):
-            if remark_or_none is shown[word_]:
-                continue
+        for word, said in shown.others(fact.force, fact.switch):
             open_rows = (one for one in range(row, stop) if one not in rows.problems)
-            if not isinstance(remark_or_none, Remark):
-                message = f"no {word_} comment is in force, after motions with one"
+            if not isinstance(said, Remark):
+                message = f"no {word} comment is in force, after motions with one"
                 rows.refuse_all(list(open_rows), ("RAP006", message))
             elif (first := next(open_rows, None)) is not None:
-                notes.append((first, len(flow.passed) + first, _annotation(document, first, remark_or_none)))
-                shown[word_] = remark_or_none
+                notes.append((first, len(flow.passed) + first, _annotation(document, first, said)))
+                shown.add(said)
     notes.sort(key=lambda note: note[:2])
     annotations = tuple(note for _, _, note in notes)
     comments, findings = _others(document, flow, rows)

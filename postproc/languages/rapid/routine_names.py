@@ -21,6 +21,8 @@ class RoutineNames:
         self._data, self._usage = data, usage
         self.aliased: set[bytes] = set()
         self._of: dict[bytes, dict[bytes, tuple[bytes, bytes]]] = {}
+        self._meanings: dict[tuple[bytes, bytes], tuple[bytes, bytes, UnknownData | None]] = {}
+        self._aliased = 0  # how many were aliased when these were found
 
     def key(self, name: bytes) -> bytes:
         """The name of a variable in the state: that of a routine's own has its routine before it."""
@@ -33,26 +35,37 @@ class RoutineNames:
 
     def look(self, name: bytes, state: ProgramState) -> Typed:
         """Value and type of a name."""
-        if name in self._usage.later:
-            return UnknownData(f"{name.decode('latin-1')} is assigned where the flow does not show it"), b""
-        key = self.key(name)
-        if key in self.aliased:
-            return UnknownData(
-                f"{name.decode('latin-1')} has a second name in a routine that changes it"
-            ), b""
-        if (
-            self._usage.set_by_name
-            and key == name
-            and name in self._data
-            and not self._data.is_constant(name)
-        ):
-            return UnknownData(f"{name.decode('latin-1')} may be set by SetDataVal"), b""
+        key, kind, unknown = self._meaning(name)
+        if unknown is not None:
+            return unknown, b""
         value = state.values.get(key)
         if value is not None:
-            return value, self._type(name, key)
+            return value, kind
         if key != name:
             return UnknownData(f"{name.decode('latin-1')} has no value yet"), b""
         return self._data.look(name)
+
+    def _meaning(self, name: bytes) -> tuple[bytes, bytes, UnknownData | None]:
+        """Key in the state and type of a name in the routine that runs, and why it is never known there, if so."""
+        routine = self.active[-1].name if self.active else b""
+        if self._aliased != len(self.aliased):  # there are new ones
+            self._aliased = len(self.aliased)
+            self._meanings.clear()
+        found = self._meanings.get((routine, name))
+        if found is None:
+            key = self.key(name)
+            lost = self._lost(name, key)
+            unknown = None if lost is None else UnknownData(f"{name.decode('latin-1')} {lost}")
+            found = self._meanings[routine, name] = key, self._type(name, key), unknown
+        return found
+
+    def _lost(self, name: bytes, key: bytes) -> str | None:
+        if name in self._usage.later:
+            return "is assigned where the flow does not show it"
+        if key in self.aliased:
+            return "has a second name in a routine that changes it"
+        own = key != name or name not in self._data or self._data.is_constant(name)
+        return "may be set by SetDataVal" if self._usage.set_by_name and not own else None
 
     def find_aliases(
         self, routine: RapidRoutine, shared: Iterable[tuple[bytes, set[bytes]]], reach: Reach

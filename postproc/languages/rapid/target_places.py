@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.base.arrays import Bools, FewRows, Floats, Ints
-from postproc.base.decimals import literals
+from postproc.base.decimals import literals, other_literal
 from postproc.languages.rapid.motion_facts import is_direct, item_of
-from postproc.languages.rapid.plain_lines import each_number, other_literal
+from postproc.languages.rapid.plain_lines import each_number
 from postproc.languages.rapid.syntax_tree import Aggregate, Argument, Index, Name, PlainPlaces
 from postproc.languages.rapid.values import Leaf, Value, numbers_of
 

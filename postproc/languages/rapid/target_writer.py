@@ -10,14 +10,12 @@ import numpy as np
 from postproc.base.arrays import Ints
 from postproc.base.decimals import fixed, fixed_one
 from postproc.base.document import Edit, Edits, Span
-from postproc.base.findings import Finding
-from postproc.languages.core.plan_rows import blocks
+from postproc.languages.core.plan_rows import PlannedNumbers, TargetWriter, blocks
 from postproc.languages.dialect import EditedTargets, Plan, Program, WritingSettings
 from postproc.languages.rapid.inserted_lines import insertions
-from postproc.languages.rapid.plan_writer import PlanWriter, PointNumbers, aggregate
+from postproc.languages.rapid.plan_writer import PlanWriter, aggregate
 from postproc.languages.rapid.target_places import MotionText, PointText
 
-HELP = "Give each motion its own point in numbers."
 _OPERAND = frozenset(b"0123456789 \t.,:+-*/'=#_$[]{}()\\ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz")
 
 
@@ -29,10 +27,12 @@ def edit_targets(program: Program, plan: Plan, writing: WritingSettings) -> Edit
     return _Writer(program, plan, writing).edited()
 
 
-class _Writer:
+class _Writer(TargetWriter[PlanWriter]):
+    code = "RAP015"
+    help = "Give each motion its own point in numbers."
+
     def __init__(self, program: Program, plan: Plan, writing: WritingSettings) -> None:
-        self.task = PlanWriter(program, plan, writing)
-        self.refused: dict[int, Finding] = {}
+        super().__init__(PlanWriter(program, plan, writing))
 
     def edited(self) -> EditedTargets:
         task = self.task
@@ -69,19 +69,19 @@ class _Writer:
             text = task.text(row)
             if text.target is None:
                 raise ValueError(f"row {row} has no target")
-            numbers = PointNumbers(said[k].tolist(), wanted[k].tolist(), task.decimals(text.target, 7))
+            numbers = PlannedNumbers(said[k].tolist(), wanted[k].tolist(), task.decimals(text.target, 7))
             yield from self._point(row, text, text.target, numbers)
             if text.via is None:
                 continue
             own = task.places.vias[row].tolist()
-            numbers = PointNumbers(own, vias[k].tolist(), task.decimals(text.via, 3))
+            numbers = PlannedNumbers(own, vias[k].tolist(), task.decimals(text.via, 3))
             if numbers.changed():
                 unfit = task.unfit_arc(int(there[k]))
                 if unfit:
                     self.refuse(row, unfit, "RAP012")
                 yield from self._point(row, text, text.via, numbers)
 
-    def _point(self, row: int, text: MotionText, point: PointText, numbers: PointNumbers) -> Iterator[Edit]:
+    def _point(self, row: int, text: MotionText, point: PointText, numbers: PlannedNumbers) -> Iterator[Edit]:
         """The edits of a point: its literals, or a point in numbers in the place of the argument."""
         changed = numbers.changed()
         if not changed:
@@ -90,7 +90,7 @@ class _Writer:
         why = self._why_not_in_place(point, spots)
         if not why:
             for i, (start, stop) in zip(changed, spots, strict=True):
-                yield Edit(Span(0, start, stop), fixed_one(numbers.wanted[i], numbers.decimals[i]))
+                yield Edit(Span(0, start, stop), numbers.literal(i))
             return
         raw, (start, stop) = self.task.raw, point.operand
         if self.task.writing.shared_points == "keep":
@@ -124,7 +124,5 @@ class _Writer:
             return f"{shown or 'its target'} is shared by several motions"
         return ""
 
-    def refuse(self, row: int, why: str, code: str = "RAP015") -> None:
-        document = self.task.program.documents[0]
-        place = document.place(self.task.text(row).start)
-        self.refused.setdefault(row, Finding(code, why, str(document.path), *place, HELP))
+    def start(self, row: int) -> int:
+        return self.task.text(row).start

@@ -6,16 +6,16 @@ import re
 from typing import NamedTuple
 
 _TOKEN = re.compile(
+    rb"[ \t\r\n\f]*+(?:"
     rb"(?P<number>(?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?+)(?![A-Za-z0-9_.])"
     rb"|(?P<name>[A-Za-z][A-Za-z0-9_]*+)"
     rb'|(?P<text>"(?:[^"\r\n]|"")*+")'
     rb"|(?P<sign>:=|<>|<=|>=|[-+*/=<>,;:\\()\[\]{}.?%])"
-    rb"|(?P<other>[^ \t\r\n\f!;]++)",
+    rb"|(?P<comment>![^\r\n]*+)|(?P<other>[^ \t\r\n\f!;]++)|(?P<end>))",
 )
-_BLANK = re.compile(rb"[ \t\r\n\f]++")
-_COMMENT = re.compile(rb"![^\r\n]*+")
 _HEADER = re.compile(rb"\s*+%%%.*?%%%", re.S)
 NUMBER, NAME, TEXT, SIGN, OTHER, END = "number", "name", "text", "sign", "other", "end"
+_COMMENT = "comment"
 
 
 class Token(NamedTuple):
@@ -49,22 +49,16 @@ class Tokens:
 
     def _at(self, at: int) -> Token:
         raw = self.raw
-        while True:
-            blank = _BLANK.match(raw, at)
-            if blank is not None:
-                at = blank.end()
-            comment = _COMMENT.match(raw, at)
-            if comment is None:
-                break
-            self.comments.append(comment.span())
-            at = comment.end()
-        found = _TOKEN.match(raw, at)
-        if found is None:
-            stop = min(at + 1, len(raw))
-            return Token(END if at >= len(raw) else OTHER, raw[at:stop], at, stop)
-        kind = found.lastgroup or OTHER
-        text = found[0]
-        return Token(kind, text.upper() if kind == NAME else text, at, found.end())
+        while found := _TOKEN.match(raw, at):
+            kind, at = found.lastgroup or OTHER, found.end()
+            if kind == NAME:
+                return Token(kind, found[kind].upper(), found.start(kind), at)
+            if kind == END and at < len(raw):
+                return Token(OTHER, raw[at : at + 1], at, at + 1)
+            if kind != _COMMENT:
+                return Token(kind, found[kind], found.start(kind), at)
+            self.comments.append(found.span(kind))
+        return Token(END, b"", at, at)
 
     def jump(self, at: int) -> None:
         """Goes on at a later byte, with no comment between."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from postproc.base.document import Document, Edit
 from postproc.base.findings import Finding, Refusal
-from postproc.languages.core.single_file import BEGIN, SingleFileDialect
+from postproc.languages.core.dialect_defaults import BEGIN, DialectDefaults
 from postproc.languages.dialect import (
     MARK,
     PLAIN,
@@ -27,7 +27,7 @@ LONGEST = 32
 """Letters of a comment (FANUC, operator's manual, remark instruction; recalled)."""
 
 
-class TpDialect(SingleFileDialect):
+class TpDialect(DialectDefaults):
     """TP as a ``Dialect``."""
 
     name = "tp"

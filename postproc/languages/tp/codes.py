@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 from postproc.base.findings import Code, Topic, define
-
-
-def _warning(title: str, meaning: str, consequence: str, action: str, example: str) -> Code:
-    return Code("warning", title, meaning=meaning, consequence=consequence, action=action, example=example)
-
-
-_STAYS = "The motion is not corrected and stays as programmed."
+from postproc.languages.core.finding_codes import STAYS, warning
 
 CODES = define(
     {
-        "FTP001": _warning(
+        "FTP001": warning(
             "statement is not understood",
             "The statement contains something that this tool does not know.",
             "Its motion is not corrected; where the robot is and which frames are selected is not known after it.",
             "Write the motion as J, L, C or A with P[n], speed, and FINE, CNT or CR.",
             "`L P[1] 100mm FINE ;` (a speed has no unit of length alone).",
         ),
-        "FTP002": _warning(
+        "FTP002": warning(
             "target is computed",
             "The target is a position register, or a point that the program computes or assigns where it runs; or the"
             " program reads the place at which the motion ends.",
@@ -28,70 +22,70 @@ CODES = define(
             "Write the target as a point of /POS.",
             "`L PR[1] 100mm/sec FINE ;`.",
         ),
-        "FTP003": _warning(
+        "FTP003": warning(
             "point is not in /POS",
             "The file has no such point.",
             "Its coordinates are unknown, so the motion is not corrected.",
             "Save the program again with its points, or add the point.",
             "`L P[7] 100mm/sec FINE ;` in a file without P[7].",
         ),
-        "FTP004": _warning(
+        "FTP004": warning(
             "point is not complete",
             "The point does not state all of its numbers, is there twice, or its configuration is not read.",
-            _STAYS,
+            STAYS,
             "Set the point again, or write X, Y, Z, W, P, R and a configuration such as 'N U T, 0, 0, 0'.",
             "`X = ********  mm` of a point that was never taught.",
         ),
-        "FTP005": _warning(
+        "FTP005": warning(
             "frame of the point is not the selected one",
             "UFRAME_NUM or UTOOL_NUM in force is not the UF or UT of the point, or neither is stated.",
             "The controller refuses such a motion, or runs it in another frame; it is not corrected.",
             "Select the frame of the point before the motion.",
             "`UFRAME_NUM=2 ;` before a point with UF : 1.",
         ),
-        "FTP006": _warning(
+        "FTP006": warning(
             "force comment differs with the path of the program",
             "Several FORCE or COMPENSATE comments may be in force at the motion.",
             "Which force acts there is not known, so the motion is not corrected.",
             "Repeat the comment before the motion.",
             "A JMP around `!FORCE 0 100 0 ;`.",
         ),
-        "FTP007": _warning(
+        "FTP007": warning(
             "structure is not understood",
             "A block has no end, a label is missing or there twice, or a section of the file is missing.",
             "Whether and how often the motions run is not known, so they are not corrected.",
             "Check labels, IF, ENDIF, FOR, ENDFOR, and the sections /MN, /POS and /END; end every statement with ;.",
             "`JMP LBL[5] ;` in a program without LBL[5].",
         ),
-        "FTP008": _warning(
+        "FTP008": warning(
             "target is displaced",
             "An offset, an increment, tracking, weaving or soft servos may displace the target.",
             "The robot goes elsewhere than to the point of the text, so the motion is not corrected.",
             "Write the points where the tool is to go, or check these motions by other means.",
             "`L P[1] 100mm/sec FINE Offset,PR[1] ;`.",
         ),
-        "FTP009": _warning(
+        "FTP009": warning(
             "motion is not reached",
             "The flow of the program does not reach the motion.",
             "When it runs, and from where, is not known, so it is not corrected.",
             "Nothing needs to be done if the motion is no cut.",
             "A motion after END.",
         ),
-        "FTP010": _warning(
+        "FTP010": warning(
             "call of another program",
             "The called program may move the robot and select frames.",
             "The position and the selected frames are unknown after the call; those of the points are taken.",
             "Check what the program does.",
             "`CALL TOOL_CHANGE(4) ;`.",
         ),
-        "FTP011": _warning(
+        "FTP011": warning(
             "several motion groups",
             "The motion is coordinated with another motion group, or moves one.",
-            _STAYS,
+            STAYS,
             "Check these motions by other means.",
             "`L P[1] 100mm/sec FINE COORD ;`, or a point with GP2.",
         ),
-        "FTP012": _warning(
+        "FTP012": warning(
             "path of an arc is not known",
             "The start of the arc is not known in numbers, its points define no circle, the tool does not turn evenly"
             " along it, or a run of A motions is not on one circle.",
@@ -99,28 +93,28 @@ CODES = define(
             "Write an L motion to the start of the arc, and the arc as C with points that are apart.",
             "`C P[1] P[1] 100mm/sec FINE ;`.",
         ),
-        "FTP013": _warning(
+        "FTP013": warning(
             "motion may end early",
             "A signal may end the motion before its target (Skip).",
-            _STAYS,
+            STAYS,
             "Check these motions by other means.",
             "`L P[1] 10mm/sec FINE Skip,LBL[1] ;`.",
         ),
-        "FTP014": _warning(
+        "FTP014": warning(
             "path of the tool to axes",
             "The point states axes, and the motion is a line or an arc.",
-            _STAYS,
+            STAYS,
             "Write the point as X, Y, Z, W, P, R.",
             "`L P[1] 100mm/sec FINE ;` with `P[1]{ GP1: UF : 1, UT : 1, J1= 0.000 deg, ...`.",
         ),
-        "FTP015": _warning(
+        "FTP015": warning(
             "point is shared by several motions",
             "Several motions, or other statements, use the point, and it is not split.",
             "A changed point would move the others too, so none of them is corrected.",
             "Give the motions points of their own, or allow copies (without --shared-points keep).",
             "P[1] is the end of a cut and the start of another one.",
         ),
-        "FTP016": _warning(
+        "FTP016": warning(
             "comment has no effect",
             "A FORCE or COMPENSATE comment is where no statement is run.",
             "It applies to no motion.",
@@ -138,21 +132,21 @@ CODES = define(
             action="Select the frames at the start of the program, and after each call.",
             example="A program without UFRAME_NUM=.",
         ),
-        "FTP018": _warning(
+        "FTP018": warning(
             "file is no TP program",
             "The file has no /MN.",
             "It may be in another language, and then nothing of it is read correctly.",
             "Check the file, or name its language in the cell: dialect: {name: ...}.",
             "A text with the ending .ls.",
         ),
-        "FTP019": _warning(
+        "FTP019": warning(
             "LINE_COUNT is not the number of lines",
             "The attribute LINE_COUNT differs from the number of numbered lines of /MN.",
             "It is not corrected: what wrote the file may know why; a controller may refuse the file.",
             "Check that the file is complete.",
             "`LINE_COUNT = 12;` of a program with 14 lines.",
         ),
-        "FTP020": _warning(
+        "FTP020": warning(
             "program sets a frame",
             "The user frame or the tool of the motion is set by the program.",
             "The place of the target in the cell is unknown, so the motion is not corrected.",

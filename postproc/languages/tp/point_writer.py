@@ -9,18 +9,16 @@ from itertools import chain, islice
 import numpy as np
 
 from postproc.base.arrays import Bools, Ints
-from postproc.base.decimals import fixed, literals
+from postproc.base.decimals import fixed, literals, other_literal
 from postproc.base.document import Edit, Edits, Span
-from postproc.base.findings import Finding
-from postproc.languages.core.plan_rows import BLOCK, blocks
+from postproc.languages.core.plan_rows import BLOCK, PlannedNumbers, TargetWriter, blocks
 from postproc.languages.dialect import EditedTargets, Plan, Program, Role, WritingSettings
 from postproc.languages.tp.position_data import TpPosition
-from postproc.languages.tp.tp_plan import NewPoints, SixNumbers, TpPlanNumbers, value_and_decimals
-from postproc.languages.tp.tp_statements import TpMove
+from postproc.languages.tp.tp_plan import NewPoints, TpPlanNumbers, new_literals
+from postproc.languages.tp.tp_statements import INSERTED_CNT, TpMove
 from postproc.toolpath import Kind
 
-HELP = "Give each motion its own point."
-FLOWING = b"CNT100"
+FLOWING = b"CNT%d" % INSERTED_CNT
 """Of inserted points at which the robot does not stop, where the motion itself does."""
 
 
@@ -32,11 +30,13 @@ def edit_targets(program: Program, plan: Plan, writing: WritingSettings) -> Edit
     return _PointWriter(program, plan, writing).edited()
 
 
-class _PointWriter:
+class _PointWriter(TargetWriter[TpPlanNumbers]):
+    code = "FTP015"
+    help = "Give each motion its own point."
+
     def __init__(self, program: Program, plan: Plan, writing: WritingSettings) -> None:
-        self.task = TpPlanNumbers(program, plan, writing)
+        super().__init__(TpPlanNumbers(program, plan, writing))
         self.points = NewPoints(self.task)
-        self.refused: dict[int, Finding] = {}
 
     def edited(self) -> EditedTargets:
         task = self.task
@@ -85,7 +85,7 @@ class _PointWriter:
         task = self.task
         spans = task.places.positions.common_spans(task.places.targets[rows].tolist())
         start, stop = spans[:, ::2].ravel(), spans[:, 1::2].ravel()
-        _, written = literals(np.frombuffer(task.raw, np.uint8), start, stop, value_and_decimals)
+        _, written = literals(np.frombuffer(task.raw, np.uint8), start, stop, other_literal)
         decimals = np.maximum(written.reshape(-1, 6), task.least).ravel()
         own, wanted = task.places.numbers[rows].ravel(), task.wanted(rows, task.own[rows]).ravel()
         changed = ~(np.abs(wanted - own) <= 0.5 * 10.0**-decimals)
@@ -116,8 +116,8 @@ class _PointWriter:
                 elif row in rewritten:
                     yield Edit(task.place(row, move.head), b"L")
 
-    def _numbers(self, point: TpPosition, own: list[float], wanted: list[float]) -> SixNumbers:
-        return SixNumbers(own, wanted, self.task.decimals(point))
+    def _numbers(self, point: TpPosition, own: list[float], wanted: list[float]) -> PlannedNumbers:
+        return PlannedNumbers(own, wanted, self.task.decimals(point))
 
     def _via(
         self, row: int, move: TpMove, motion: int, wanted: list[float], rewritten: bool
@@ -139,7 +139,7 @@ class _PointWriter:
         """The number of a new point for the middle of an arc."""
         point = self.task.point(row)
         own = self.task.places.numbers[row].tolist()
-        return self.points.add(point, self._numbers(point, own, wanted).changed())
+        return self.points.add(point, new_literals(self._numbers(point, own, wanted)))
 
     def _check_arc(self, row: int, motion: int) -> None:
         unfit = self.task.unfit_arc(motion)
@@ -147,10 +147,10 @@ class _PointWriter:
             self.refuse(row, unfit, "FTP012")
 
     def _point(
-        self, row: int, move: TpMove, which: int, point: TpPosition, numbers: SixNumbers
+        self, row: int, move: TpMove, which: int, point: TpPosition, numbers: PlannedNumbers
     ) -> Iterator[Edit]:
         """The edits of a point: its literals, or the number of a new point in the motion."""
-        changed = numbers.changed()
+        changed = new_literals(numbers)
         if not changed:
             return
         why = self._why_not_in_place(point)
@@ -193,7 +193,7 @@ class _PointWriter:
     def _line(self, motion: int, row: int, wanted: list[float], via: list[float], now: list[float]) -> bytes:
         task = self.task
         move, point = task.move(row), task.point(row)
-        literals = self._numbers(point, task.places.numbers[row].tolist(), wanted).changed()
+        literals = new_literals(self._numbers(point, task.places.numbers[row].tolist(), wanted))
         if now:
             external = self.points.external(point, now, task.path.external[row].tolist())
             if external is None:
@@ -240,7 +240,5 @@ class _PointWriter:
         ):
             yield Edit(Span(0, span[0], span[0] + len(b"%d" % listing.count)), b"%d" % count)
 
-    def refuse(self, row: int, why: str, code: str = "FTP015") -> None:
-        document = self.task.program.documents[0]
-        place = document.place(self.task.place(row, self.task.move(row).head).start)
-        self.refused.setdefault(row, Finding(code, why, str(document.path), *place, HELP))
+    def start(self, row: int) -> int:
+        return self.task.place(row, self.task.move(row).head).start

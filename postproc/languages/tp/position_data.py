@@ -191,10 +191,10 @@ def _position(raw: bytes, head: re.Match[bytes], stop: int) -> tuple[TpPosition,
         after = _item(raw, at, stop, one)
         if after < 0:
             one.problem = f"P[{one.number}] is not understood"
-            later = _CLOSE.search(raw, at, stop)
             following = _NEXT.search(raw, at, stop)
-            ends = [found for found in (later and later.end(), following and following.start()) if found]
-            one.stop = min(ends, default=stop)
+            one.stop = stop if following is None else following.start()
+            later = _CLOSE.search(raw, at, one.stop)
+            one.stop = one.stop if later is None else later.end()
             return one, False
         comma = _COMMA.match(raw, after, stop)
         at = after if comma is None else comma.end()

@@ -1,7 +1,10 @@
-"""Where the flow of a TP program goes on after each statement."""
+"""The statements of a TP program as the blocks of its flow."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+from postproc.languages.core.flow_graph import END, FlowBlock, FlowGraph
 from postproc.languages.tp.tp_statements import (
     BlockElse,
     BlockEnd,
@@ -11,139 +14,136 @@ from postproc.languages.tp.tp_statements import (
     LabelStatement,
     LoopEnd,
     LoopStart,
+    OtherStatement,
     ProgramEnd,
     TimeoutStatement,
     TpMove,
     TpStatement,
 )
 
-END = -1
-"""In the place of a statement: the end of the program."""
-
-
 MOST_JUMPS = 50_000
 """Places to which computed jumps may lead, all together."""
+UNDECIDED = ConditionalStatement(None, OtherStatement())
+"""A condition of which nothing is known."""
 
 
-class StatementFlow:
-    """The blocks of a program, each of statements that run from its first to its last.
+class TpStep(NamedTuple):
+    """A statement, or what one does where its condition holds; ``at``: its index."""
 
-    ``problem``: index of a statement whose structure is not understood, and why; None where all is.
-    ``blocks``: first and last + 1 statement of each; ``block_at``: first statement -> block.
-    """
+    at: int
+    one: TpStatement
+
+
+class TpCondition(NamedTuple):
+    at: int
+    one: ConditionalStatement
+
+
+class _Opened(NamedTuple):
+    """An open IF, ELSE or FOR: its index, the block with its condition, and the last block before ELSE."""
+
+    at: int
+    head: FlowBlock[TpStep, TpCondition] | int
+    end: FlowBlock[TpStep, TpCondition] | None = None
+
+
+class StatementFlow(FlowGraph[TpStep, TpCondition, int]):
+    """The blocks of a program.  ``problem``: index of a statement whose structure is not understood, and why; None
+    where all is."""
 
     def __init__(self, statements: list[TpStatement]) -> None:
+        super().__init__()
         self.statements = statements
         self.problem: tuple[int, str] | None = None
-        self.labels: dict[int, int] = {}
-        self._partners: dict[int, int] = {}
-        self._find_labels()
-        self._match_blocks()
-        if self.problem is None:
-            self._check_jumps()
-        self.blocks: list[tuple[int, int]] = []
-        self.block_at: dict[int, int] = {}
-        if self.problem is None and statements:
-            self._cut()
+        self._opened: list[_Opened] = []
+        self._wanted: list[tuple[int, int]] = []  # indices of statements, and labels to which they lead
+        self._every = self._find_labels()
+        self._computed = 0  # jumps
+        for at, one in enumerate(statements):
+            if self.problem is None:
+                self._take(at, one)
+        if self._opened:
+            self._refuse(self._opened[-1].at, "a block that starts here has no end")
+        if self._computed * len(self._every) > MOST_JUMPS:
+            self._refuse(0, "too many computed jumps may lead to too many labels")
+        known = set(self._every)
+        for at, label in self._wanted:
+            if label not in known:
+                self._refuse(at, f"LBL[{label}] is not in the program")
+        self.link()
 
-    def _find_labels(self) -> None:
+    @property
+    def is_structured(self) -> bool:
+        return False
+
+    def _find_labels(self) -> list[int]:
+        found: dict[int, None] = {}
         for at, one in enumerate(self.statements):
             if isinstance(one, LabelStatement):
-                if one.number in self.labels:
+                if one.number in found:
                     self._refuse(at, f"LBL[{one.number}] is in the program twice")
-                self.labels.setdefault(one.number, at)
+                found[one.number] = None
+        return list(found)
 
     def _refuse(self, at: int, why: str) -> None:
         if self.problem is None:
             self.problem = (at, why)
 
-    def _match_blocks(self) -> None:
-        """Partners: IF -> where it goes on without its condition, ELSE -> ENDIF, FOR <-> ENDFOR."""
-        opened: list[int] = []
-        for at, one in enumerate(self.statements):
-            match one:
-                case BlockStart() | LoopStart():
-                    opened.append(at)
-                case BlockElse():
-                    if not opened or not isinstance(self.statements[opened[-1]], BlockStart):
-                        self._refuse(at, "ELSE has no IF")
-                        continue
-                    self._partners[opened.pop()] = at + 1
-                    opened.append(at)
-                case BlockEnd():
-                    if not opened or isinstance(self.statements[opened[-1]], LoopStart):
-                        self._refuse(at, "ENDIF has no IF")
-                        continue
-                    self._partners[opened.pop()] = at
-                case LoopEnd():
-                    if not opened or not isinstance(self.statements[opened[-1]], LoopStart):
-                        self._refuse(at, "ENDFOR has no FOR")
-                        continue
-                    start = opened.pop()
-                    self._partners[start], self._partners[at] = at + 1, start
-        if opened:
-            self._refuse(opened[-1], "a block that starts here has no end")
-
-    def targets(self, one: TpStatement) -> list[int | None]:
-        """Labels to which a statement may lead; None for one that is computed."""
+    def _take(self, at: int, one: TpStatement) -> None:
         match one:
-            case JumpStatement() | TimeoutStatement():
-                return [one.label]
-            case ConditionalStatement():
-                return self.targets(one.action)
-            case TpMove():
-                return [] if one.skip is None else [one.skip]
-            case _:
-                return []
-
-    def _check_jumps(self) -> None:
-        computed = sum(None in self.targets(one) for one in self.statements)
-        if computed * len(self.labels) > MOST_JUMPS:
-            self._refuse(0, "too many computed jumps may lead to too many labels")
-        for at, one in enumerate(self.statements):
-            for label in self.targets(one):
-                if label is not None and label not in self.labels:
-                    self._refuse(at, f"LBL[{label}] is not in the program")
-
-    def _cut(self) -> None:
-        starts = {0, *self.labels.values()}
-        for at, one in enumerate(self.statements):
-            if self.targets(one) or isinstance(
-                one, ProgramEnd | BlockStart | BlockElse | LoopEnd | ConditionalStatement
-            ):
-                starts.add(at + 1)
-            if isinstance(one, LoopStart | BlockEnd):
-                starts |= {at, at + 1}
-        ordered = sorted(at for at in starts if at < len(self.statements))
-        for at, following in zip(ordered, [*ordered[1:], len(self.statements)], strict=True):
-            self.block_at[at] = len(self.blocks)
-            self.blocks.append((at, following))
-
-    def after(self, at: int) -> list[int]:
-        """Statements that may follow the statement ``at``, END among them; a condition is not decided here."""
-        one = self.statements[at]
-        follow = self._next(at + 1)
-        match one:
-            case ProgramEnd():
-                return [END]
+            case LabelStatement():
+                self.label(one.number)
             case JumpStatement():
-                return self._leads(one)
-            case ConditionalStatement(action=ProgramEnd()):
-                return [follow, END]
-            case BlockStart() | LoopStart():
-                return [follow, self._next(self._partners[at])]
-            case BlockElse():
-                return [self._next(self._partners[at])]
-            case LoopEnd():
-                return [self._partners[at]]
+                self._jump(at, one.label)
+            case ProgramEnd():
+                self.leave(END)
+            case ConditionalStatement():
+                head = self.branch(TpCondition(at, one))
+                if isinstance(one.action, JumpStatement | ProgramEnd):
+                    self._take(at, one.action)
+                    self.otherwise(head)
+                else:
+                    self.step(TpStep(at, one.action))
+                    self.meet([self.otherwise(head)])
+            case BlockStart():
+                self._opened.append(_Opened(at, self.branch(TpCondition(at, UNDECIDED))))
+            case LoopStart():
+                self._opened.append(_Opened(at, self.loop(TpCondition(at, UNDECIDED), [TpStep(at, one)])))
+            case BlockElse() | BlockEnd() | LoopEnd():
+                self._close(at, one)
             case _:
-                return [follow, *self._leads(one)]
+                self.step(TpStep(at, one))
+                if isinstance(one, TimeoutStatement):
+                    self._may_jump(at, one.label)
+                elif isinstance(one, TpMove) and one.skip is not None:
+                    self._may_jump(at, one.skip)
 
-    def _next(self, at: int) -> int:
-        return at if at < len(self.statements) else END
+    def _close(self, at: int, one: BlockElse | BlockEnd | LoopEnd) -> None:
+        opened = self._opened.pop() if self._opened else _Opened(at, -1)
+        head, end = opened.head, opened.end
+        if isinstance(one, LoopEnd):
+            if isinstance(head, int) and head >= 0:
+                self.end_loop(head)
+            else:
+                self._refuse(at, "ENDFOR has no FOR")
+        elif isinstance(head, int) or (isinstance(one, BlockElse) and end is not None):
+            self._refuse(at, "ELSE has no IF" if isinstance(one, BlockElse) else "ENDIF has no IF")
+        elif isinstance(one, BlockElse):
+            self._opened.append(_Opened(at, head, self.otherwise(head)))
+        else:
+            self.meet([self.otherwise(head) if end is None else end])
 
-    def _leads(self, one: TpStatement) -> list[int]:
-        found: list[int] = []
-        for label in self.targets(one):
-            found += self.labels.values() if label is None else [self.labels[label]]
-        return found or ([END] if isinstance(one, JumpStatement) else [])
+    def _jump(self, at: int, label: int | None) -> None:
+        """JMP; None: to any label."""
+        if label is not None:
+            self._wanted.append((at, label))
+            self.jump(label)
+            return
+        self._may_jump(at, None)
+        self.leave(END)
+
+    def _may_jump(self, at: int, label: int | None) -> None:
+        self._computed += label is None
+        if label is not None:
+            self._wanted.append((at, label))
+        self.may_jump(self._every if label is None else [label])

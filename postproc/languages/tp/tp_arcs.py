@@ -7,6 +7,7 @@ import numpy as np
 from postproc.base.arrays import Floats, Ints
 from postproc.base.geometry import arc_through, rotation_from_abc, rotation_from_vector, turn_between
 from postproc.base.units import DEG, MM
+from postproc.languages.core.row_facts import circles
 from postproc.languages.tp.tp_rows import TpRows
 from postproc.toolpath import Arcs, Kind
 
@@ -61,23 +62,17 @@ def arcs_of(
             starts[k], vias[k] = position[start], rows.vias[row, :3] * MM
             _check_turn(rows, row, start, rotation)
     ends = position[at]
-    found = list(arc_through(starts, vias, ends))
-    known = np.isfinite(found[2]) & _apart(starts, vias, ends)
+    found = circles(starts, vias, ends, SHORTEST)
     for k, row in enumerate(at):
         if row in of_run:
             continue
-        if not known[k]:
+        if np.isnan(found[2][k]):
             rows.refuse(row, "FTP012", "its points define no circle that is known")
         elif row not in rows.problems:
             centre[row], normal[row], sweep[row] = found[0][k], found[1][k], found[2][k]
     for run in arc_runs(rows):
         _run(rows, run, position, (centre, normal, sweep))
     return Arcs(centre=centre, normal=normal, sweep=sweep), of_run
-
-
-def _apart(starts: Floats, vias: Floats, ends: Floats) -> np.ndarray:
-    pairs = ((starts, vias), (vias, ends), (starts, ends))
-    return np.asarray(np.min([np.linalg.norm(a - b, axis=1) for a, b in pairs], axis=0) > SHORTEST)
 
 
 def _start(rows: TpRows, row: int, kinds: Ints) -> int:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import chain
-from typing import NamedTuple
 
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
-from postproc.base.decimals import fixed_one
+from postproc.base.decimals import decimals_of, fixed_one
 from postproc.base.document import Span
 from postproc.base.geometry import abc_from_rotation, rotation_from_vector, turn_between
 from postproc.base.units import DEG, MM
-from postproc.languages.core.plan_rows import ArcLimits, PlanRows
+from postproc.languages.core.plan_rows import ArcLimits, PlannedNumbers, PlanRows
 from postproc.languages.dialect import Plan, Program, WritingSettings
 from postproc.languages.tp.position_data import CARTESIAN, EXTERNAL, TpPosition
 from postproc.languages.tp.tp_source_map import TpSourceMap
@@ -21,23 +20,6 @@ from postproc.languages.tp.tp_statements import TpMove
 
 MOST_POINTS = 10**8
 """Numbers of points from here on are left out where the next free one is looked for: more digits are not read."""
-
-
-class SixNumbers(NamedTuple):
-    """X, Y, Z [mm], W, P, R [deg]: what the text says, what is wanted, and the decimals of each."""
-
-    own: list[float]
-    wanted: list[float]
-    decimals: list[int]
-
-    def changed(self) -> dict[bytes, bytes]:
-        """Name -> new literal of the numbers that differ by more than half a written step."""
-        pairs = zip(CARTESIAN, self.own, self.wanted, self.decimals, strict=True)
-        return {
-            name: fixed_one(wanted, count)
-            for name, own, wanted, count in pairs
-            if not abs(wanted - own) <= 0.5 * 10.0**-count
-        }
 
 
 class TpPlanNumbers(PlanRows):
@@ -74,7 +56,7 @@ class TpPlanNumbers(PlanRows):
         """Of the six numbers of a point: those of the text, or the least."""
         spans = point.groups[0].spans
         return [
-            max(least, _decimals_of(self.raw[slice(*spans[name])]))
+            max(least, decimals_of(self.raw[slice(*spans[name])]))
             for name, least in zip(CARTESIAN, self.least, strict=True)
         ]
 
@@ -97,6 +79,11 @@ class TpPlanNumbers(PlanRows):
         turn = rotation_from_vector(0.5 * turn_between(start, plan.rotation[motions]))
         angles = abc_from_rotation(turn @ start, near[:, 5:2:-1] * DEG)[:, ::-1] / DEG
         return np.concatenate([self.middles(motions), angles], axis=1)
+
+
+def new_literals(numbers: PlannedNumbers) -> dict[bytes, bytes]:
+    """Name -> new literal of those of X, Y, Z, W, P, R that change."""
+    return {CARTESIAN[i]: numbers.literal(i) for i in numbers.changed()}
 
 
 class NewPoints:
@@ -137,13 +124,3 @@ class NewPoints:
                 return None
             literals[name] = fixed_one(there, self.task.least[0])
         return literals
-
-
-def value_and_decimals(literal: bytes) -> tuple[float, int]:
-    return float(literal), _decimals_of(literal)
-
-
-def _decimals_of(literal: bytes) -> int:
-    """The decimals that a literal is written with, its exponent considered."""
-    mantissa, _, exponent = literal.upper().partition(b"E")
-    return min(max(len(mantissa.partition(b".")[2]) - int(exponent or b"0"), 0), 12)

@@ -7,11 +7,15 @@ executions.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from enum import IntEnum
-from typing import NamedTuple
 
+from postproc.languages.core.comments_in_force import VARYING, Varying, place_of
+from postproc.languages.core.field_joins import FieldJoins, lost
+from postproc.languages.core.flow_runner import FlowRunner
+from postproc.languages.core.motion_sources import ELSEWHERE, START, Meeting, Source, met
+from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
+from postproc.languages.core.rounded_numbers import are_comparable
 from postproc.languages.core.waits import Waits
-from postproc.languages.tp.statement_flow import END, StatementFlow
+from postproc.languages.tp.statement_flow import StatementFlow, TpStep
 from postproc.languages.tp.tp_statements import (
     ConditionalStatement,
     DisplacementSwitch,
@@ -32,29 +36,21 @@ from postproc.languages.tp.tp_statements import (
     WaitStatement,
 )
 
-START, ELSEWHERE = -1, -2
-"""In the place of a motion: the start of the program; what the program does not contain."""
+Said = TpRemark | Varying | None
 
 
-class Contradictory(IntEnum):
-    """In the place of a comment in force: it differs with the path of the program."""
-
-    CONTRADICTORY = 0
-
-
-CONTRADICTORY = Contradictory.CONTRADICTORY
-Said = TpRemark | Contradictory | None
+NO_REGISTERS = PersistentMap(KeyNumbers())
 
 
 @dataclass(frozen=True, slots=True)
 class TpState:
     """``base``, ``tool``: the selected numbers, None where they are not known; ``registers``: number -> value of those
-    that are known; ``displaced``: what displaces targets; ``override``: factor of speeds, None where it is not
-    known."""
+    that are known, the same object where another path adds nothing; ``displaced``: what displaces targets;
+    ``override``: factor of speeds, None where it is not known."""
 
     base: int | None = None
     tool: int | None = None
-    registers: tuple[tuple[int, float], ...] = ()
+    registers: PersistentMap = NO_REGISTERS
     displaced: frozenset[bytes] = frozenset()
     override: float | None = 1.0
     force: Said = None
@@ -62,21 +58,13 @@ class TpState:
 
     def joined(self, other: TpState) -> TpState:
         """What holds where two paths meet."""
-        if self == other:
-            return self
-        return TpState(
-            self.base if self.base == other.base else None,
-            self.tool if self.tool == other.tool else None,
-            tuple(sorted(set(self.registers) & set(other.registers))),
-            self.displaced | other.displaced,
-            self.override if self.override == other.override else None,
-            self.force if self.force == other.force else CONTRADICTORY,
-            self.switch if self.switch == other.switch else CONTRADICTORY,
-        )
+        changed = _JOINS.changes(self, other)
+        return replace(self, **changed) if changed else self
 
     def value(self, operand: Operand) -> float | None:
         if isinstance(operand, RegisterOperand):
-            return dict(self.registers).get(operand.number)
+            value: float | None = self.registers.get(operand.number)
+            return value
         return operand
 
     def result(self, expression: RegisterExpression) -> float | None:
@@ -98,24 +86,51 @@ class TpState:
 
     def with_register(self, number: int, value: float | None) -> TpState:
         """Another value of a register, None where it is not known; number -1: any of them may have another one."""
-        known = {} if number < 0 else {key: old for key, old in self.registers if key != number}
-        if value is not None and abs(value) < 1e9:
-            known[number] = value
-        return replace(self, registers=tuple(sorted(known.items())))
+        if number < 0:
+            return self.without_registers()
+        kept = value if value is not None and abs(value) < 1e9 else None
+        return replace(self, registers=self.registers.set(number, kept))
+
+    def without_registers(self) -> TpState:
+        return replace(self, registers=PersistentMap(self.registers.numbers))
 
 
-class Reached(NamedTuple):
+_JOINS = FieldJoins(
+    {
+        "base": lost(None),
+        "tool": lost(None),
+        "registers": PersistentMap.common,
+        "displaced": frozenset.union,
+        "override": lost(None),
+        "force": lost(VARYING),
+        "switch": lost(VARYING),
+    }
+)
+
+
+@dataclass(slots=True)
+class Reached:
     """What holds at a place of the program; ``last``: statements of the motions after which the robot is here;
     ``waits``: whether the program waited since."""
 
     state: TpState
-    last: frozenset[int] = frozenset([START])
+    last: frozenset[Source] = frozenset([START])
     waits: Waits = Waits.NO
 
-    def joined(self, other: Reached) -> Reached:
-        """What holds where two paths meet."""
-        waits = self.waits if self.waits == other.waits else Waits.MAYBE
-        return Reached(self.state.joined(other.state), self.last | other.last, waits)
+    def copy(self) -> Reached:
+        return Reached(self.state, self.last, self.waits)
+
+    def join(self, other: Reached, meeting: Meeting) -> bool:
+        """Takes in what holds where another path meets this one, at the place of ``meeting``; whether anything
+        changed."""
+        before = self.copy()
+        self.state = self.state.joined(other.state)
+        self.last = met(self.last, other.last, meeting)
+        self.waits = self.waits if self.waits == other.waits else Waits.MAYBE
+        return self.state is not before.state or (self.last, self.waits) != (before.last, before.waits)
+
+    def is_same(self, other: Reached) -> bool:
+        return self == other
 
 
 NOWHERE = frozenset([ELSEWHERE])
@@ -130,97 +145,86 @@ class TpPropagation:
 
     flow: StatementFlow
     before: list[TpState | None] = field(init=False)
-    jumps: dict[int, frozenset[int]] = field(default_factory=dict)
+    jumps: dict[int, frozenset[Source]] = field(default_factory=dict)
     calls: dict[int, str] = field(default_factory=dict)
-    reads: dict[int, frozenset[int]] = field(default_factory=dict)
+    reads: dict[int, frozenset[Source]] = field(default_factory=dict)
     unread: set[int] = field(default_factory=set)
     waits: dict[int, Waits] = field(default_factory=dict)
     _alters: bool = field(init=False)
+    _runner: FlowRunner[StatementFlow, Reached] = field(init=False)
 
     def __post_init__(self) -> None:
         self.before = [None] * len(self.flow.statements)
         self._alters = any(isinstance(one, TpMove) and one.alters for one in self.flow.statements)
+        self._runner = FlowRunner(self._after)
 
     def run(self, state: TpState) -> None:
         """Follows the program from its first statement."""
-        if self.flow.problem is not None or not self.flow.blocks:
-            return
-        starts = {0: Reached(state)}
-        pending = {0}
-        while pending:
-            block = min(pending)
-            pending.remove(block)
-            for there, after in self._through(block, starts[block], False):
-                known = starts.get(there)
-                new = after if known is None else known.joined(after)
-                if new != known:
-                    starts[there] = new
-                    pending.add(there)
-        for block in sorted(starts):
-            self._through(block, starts[block], True)
+        if self.flow.problem is None:
+            registers = PersistentMap(KeyNumbers())
+            self._runner.run(self.flow, Reached(replace(state, registers=registers)), True)
 
-    def _through(self, block: int, state: Reached, recording: bool) -> list[tuple[int, Reached]]:
-        """The blocks that follow one, and what holds there."""
-        first, last = self.flow.blocks[block]
-        for at in range(first, last):
-            one = self.flow.statements[at]
-            if recording and isinstance(one, TpMove | TpRemark | StatementNotRead):
-                self.before[at] = state.state
-                if len(state.last) != 1 or at - 1 not in state.last:
-                    self.jumps[at] = state.last
-                if state.waits and isinstance(one, TpMove):
-                    self.waits[at] = state.waits
-            if at == last - 1:
-                return self._leave(at, one, state, recording)
-            state = self._step(at, one, state, recording)
-        return []
+    def _after(self, flow: StatementFlow, at: int, reached: Reached) -> list[tuple[int, Reached]]:
+        """Where a block leads, and what holds there."""
+        block = flow.blocks[at]
+        for step in block.steps:
+            if self._runner.recording:
+                self._record(step, reached)
+            self._step(step.one, step.at, reached)
+        leads = [block.follow, *block.further]
+        if block.condition is not None:
+            place, one = block.condition
+            if self._runner.recording:
+                self._record(TpStep(place, one.action), reached)
+            holds = _decided(one, reached.state)
+            leads = [block.follow, block.otherwise]
+            if holds is not None:
+                leads = leads[:1] if holds else leads[1:]
+        return [(there, reached) for there in leads]
 
-    def _leave(self, at: int, one: TpStatement, state: Reached, recording: bool) -> list[tuple[int, Reached]]:
-        after = self.flow.after(at)
-        states = dict.fromkeys(after, state)
-        if isinstance(one, ConditionalStatement):
-            done = self._step(at, one.action, state, recording)
-            holds = _decided(one, state.state)
-            leads = self.flow.targets(one)
-            if leads:
-                jumps, follow = set(after[1:]), after[0]
-                states = dict.fromkeys(after, state)
-                if holds is not None:
-                    states = dict.fromkeys(jumps if holds else {follow}, state)
-            elif END in after and len(after) == 2:
-                states = {there: state for there in after if holds is None or (there == END) == holds}
-            else:
-                states = {after[0]: done if holds else state if holds is False else state.joined(done)}
-        else:
-            done = self._step(at, one, state, recording)
-            states = dict.fromkeys(after, done)
-        return [(self.flow.block_at[there], new) for there, new in states.items() if there != END]
+    def _record(self, step: TpStep, reached: Reached) -> None:
+        at, one = step
+        match one:
+            case ProgramCall():
+                self.calls.setdefault(at, one.name)
+            case PositionUse(reads_place=True):
+                self.reads[at] = self.reads.get(at, frozenset()) | reached.last
+            case StatementNotRead(moves=False):
+                self.unread.add(at)
+        if isinstance(one, TpMove | TpRemark | StatementNotRead) and one is self.flow.statements[at]:
+            self.before[at] = reached.state
+            if reached.last != {at - 1}:
+                self.jumps[at] = reached.last
+            if reached.waits and isinstance(one, TpMove):
+                self.waits[at] = reached.waits
 
-    def _step(self, at: int, one: TpStatement, reached: Reached, recording: bool) -> Reached:
-        state, last, waits = reached
+    def _step(self, one: TpStatement, at: int, reached: Reached) -> None:
+        """Runs a statement."""
+        state = reached.state
         if isinstance(one, TpMove):
             # where a displaced or interrupted motion ends is not in the text
-            state = replace(state, base=None, tool=None, registers=()) if one.alters else state
             ends = {ELSEWHERE} if one.problem is not None else {at, ELSEWHERE} if state.displaced else {at}
-            return Reached(state, frozenset(ends))
+            reached.last, reached.waits = frozenset(ends), Waits.NO
+            if one.alters:
+                reached.state = _nothing_set(state)
+            return
         if isinstance(one, StatementNotRead) and one.moves:
-            return Reached(state, frozenset([at]))
-        if isinstance(one, PositionUse) and one.reads_place and recording:
-            self.reads[at] = self.reads.get(at, frozenset()) | last
-        new = self._state_after(at, one, state, recording)
+            reached.last, reached.waits = frozenset([at]), Waits.NO
+            return
+        reached.state = self._state_after(one, state)
         if isinstance(one, ProgramCall | StatementNotRead):
-            return Reached(new, NOWHERE, Waits.MAYBE)
-        if isinstance(one, WaitStatement):
-            waits = Waits.YES if one.surely else max(waits, Waits.MAYBE)
+            reached.last, reached.waits = NOWHERE, Waits.MAYBE
+        elif isinstance(one, WaitStatement):
+            reached.waits = Waits.YES if one.surely else max(reached.waits, Waits.MAYBE)
         elif isinstance(one, TimeoutStatement):
-            waits = max(waits, Waits.MAYBE)
-        return Reached(new, last, waits)
+            reached.waits = max(reached.waits, Waits.MAYBE)
 
-    def _state_after(self, at: int, one: TpStatement, state: TpState, recording: bool) -> TpState:
+    def _state_after(self, one: TpStatement, state: TpState) -> TpState:
         """What holds after a statement that is no motion."""
         match one:
             case TpRemark():
-                return _remark(one, state)
+                place = place_of(one.text)
+                return replace(state, **{place: one}) if place else state  # type: ignore[arg-type]
             case FrameSelection():
                 value = state.result(one.value)
                 number = int(value) if value is not None and value == int(value) and value >= 0 else None
@@ -238,25 +242,17 @@ class TpPropagation:
                 changed = state.displaced | {one.name} if one.starts else state.displaced - {one.name}
                 return replace(state, displaced=frozenset(changed))
             case ProgramCall():
-                if recording:
-                    self.calls.setdefault(at, one.name)
-                return replace(state, base=None, tool=None, registers=())
+                return _nothing_set(state)
             case StatementNotRead():
-                if recording:
-                    self.unread.add(at)
                 lost = state.displaced | ({b"a statement that is not understood"} if one.displaces else set())
                 state = replace(state, override=None, displaced=frozenset(lost))
-                return replace(state, base=None, tool=None, registers=())
+                return _nothing_set(state)
         return state
 
 
-def _remark(one: TpRemark, state: TpState) -> TpState:
-    words = one.text.replace("\t", " ").replace(",", " ").split(" ")
-    if words[0].upper() == "FORCE":
-        return replace(state, force=one)
-    if words[0].upper() == "COMPENSATE":
-        return replace(state, switch=one)
-    return state
+def _nothing_set(state: TpState) -> TpState:
+    """The same where base, tool and registers may be any."""
+    return replace(state.without_registers(), base=None, tool=None)
 
 
 def _decided(one: ConditionalStatement, state: TpState) -> bool | None:
@@ -265,6 +261,6 @@ def _decided(one: ConditionalStatement, state: TpState) -> bool | None:
         return None
     left, sign, right = one.condition
     a, b = state.value(left), state.value(right)
-    if a is None or b is None:
+    if a is None or b is None or not are_comparable(a, b):
         return None
     return {b"=": a == b, b"<>": a != b, b"<": a < b, b">": a > b, b"<=": a <= b, b">=": a >= b}[sign]

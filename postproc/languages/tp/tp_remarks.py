@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
-from postproc.languages.core.row_facts import SPEAKS
+from postproc.languages.core.comments_in_force import SPEAKS, ShownComments
 from postproc.languages.dialect import MARK
 from postproc.languages.tp.tp_listing import TpListing
 from postproc.languages.tp.tp_propagation import TpPropagation
@@ -24,18 +24,17 @@ def annotate(
     annotations: list[Annotation] = []
     comments: list[Annotation] = []
     findings: list[Finding] = []
-    shown: dict[str, TpRemark | None] = {"FORCE": None, "COMPENSATE": None}
+    shown = ShownComments()
     row = 0
     for at, one in enumerate(run.flow.statements):
         if isinstance(one, TpRemark):
             line = listing.statements[at].line
-            word = SPEAKS.match(one.text)
-            if word is None:
+            if SPEAKS.match(one.text) is None:
                 if one.text and not one.text.startswith(MARK):
                     comments.append(Annotation(row, one.text, line))
             elif run.before[at] is not None:
                 annotations.append(Annotation(row, one.text, line))
-                shown[word[0].upper()] = one
+                shown.add(one)
             else:
                 message = f"the comment {one.text[:40]!r} is where no statement is run"
                 findings.append(Finding("FTP016", message, str(document.path), *document.place(one.start)))
@@ -46,20 +45,16 @@ def annotate(
     return ProgramComments(tuple(annotations), tuple(comments)), findings
 
 
-def _repeated(
-    rows: TpRows, row: int, shown: dict[str, TpRemark | None], document: Document
-) -> list[Annotation]:
+def _repeated(rows: TpRows, row: int, shown: ShownComments, document: Document) -> list[Annotation]:
     """Comments in force at a row that are not the last ones in the text above."""
     state = rows.states[row]
     if state is None or row in rows.problems:
         return []
     found = []
-    for word, said in (("FORCE", state.force), ("COMPENSATE", state.switch)):
-        if said is shown[word]:
-            continue
+    for word, said in shown.others(state.force, state.switch):
         if isinstance(said, TpRemark):
             found.append(Annotation(row, said.text, document.place(said.start)[0]))
-            shown[word] = said
+            shown.add(said)
         else:
             rows.refuse(row, "FTP006", f"no {word} comment is in force, below one in the text")
     return found

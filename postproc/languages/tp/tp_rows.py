@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
+
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats
 from postproc.base.document import Document
+from postproc.languages.core.comments_in_force import CONTRADICTED, VARYING
+from postproc.languages.core.frame_table import FrameTable
+from postproc.languages.core.motion_sources import ELSEWHERE, START, Meeting, Source, distinguished, expanded
 from postproc.languages.core.waits import Waits
 from postproc.languages.tp.position_data import (
     CARTESIAN,
@@ -18,14 +24,14 @@ from postproc.languages.tp.position_data import (
 from postproc.languages.tp.statement_flow import StatementFlow
 from postproc.languages.tp.tp_listing import NumberedStatement, TpListing
 from postproc.languages.tp.tp_propagation import (
-    CONTRADICTORY,
-    ELSEWHERE,
-    START,
     TpPropagation,
     TpState,
 )
 from postproc.languages.tp.tp_statements import PositionUse, StatementNotRead, TpMove, TpStatement
 from postproc.toolpath import LOST, FrameRef, Kind
+
+_CR = 1e6
+"""Numbers of registers that have a distance are this far from those of registers that have a number of CNT."""
 
 TURNS = 50
 """Turns of an axis from -50 to 49 are kept as numbers."""
@@ -40,7 +46,8 @@ class TpRows:
     their texts; ``targets``, ``middles`` (N,): numbers of their points, -1 without; ``states``: what holds before each,
     None where it is not run; ``problems``: row -> code and reason for which it cannot be corrected; ``jumps``: row ->
     rows after which it runs, where that is not the row before it alone: START for the start of the program, ELSEWHERE
-    for what it does not contain; ``waits``: rows before which the program waits -> whether it surely does.
+    for what it does not contain, and alone where they are too many to be distinguished (``paths``: these, as
+    statements); ``waits``: rows before which the program waits -> whether it surely does.
     """
 
     def __init__(self, at: list[int], moves: list[TpMove | None], run: TpPropagation) -> None:
@@ -57,11 +64,12 @@ class TpRows:
         self.targets, self.middles = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
         self.base, self.tool = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
         self.nut, self.revolutions = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
+        self.paths: dict[int, frozenset[Source]] = {}
         self.jumps = self._jumps(run)
         self.waits = {int(self.row_of[one]): waits == Waits.YES for one, waits in run.waits.items()}
         self.axes: dict[int, tuple[float, ...]] = {}
         self.problems: dict[int, tuple[str, str]] = {}
-        self.frames: list[FrameRef] = []
+        self.frames = FrameTable()
         self.assumed: dict[int, str] = {}
 
     def _jumps(self, run: TpPropagation) -> dict[int, tuple[int, ...]]:
@@ -70,11 +78,16 @@ class TpRows:
             last = run.jumps.get(at)
             if state is None:
                 found[row] = (ELSEWHERE,)
+            elif last is not None and not distinguished(last):
+                self.paths[row], found[row] = last, (ELSEWHERE,)
             elif last is not None:
-                own = {one if one in (START, ELSEWHERE) else int(self.row_of[one]) for one in last}
+                own = {self._row(one) for one in expanded(last, set())}
                 if own != {row - 1}:
                     found[row] = tuple(sorted(own))
         return found
+
+    def _row(self, statement: int) -> int:
+        return statement if statement in (START, ELSEWHERE) else int(self.row_of[statement])
 
     def __len__(self) -> int:
         return len(self.at)
@@ -82,6 +95,17 @@ class TpRows:
     def before(self, row: int) -> tuple[int, ...]:
         """Rows after which a row runs, as ``jumps`` has them."""
         return self.jumps.get(row, (row - 1,))
+
+    def starts_of(self, row: int, visited: set[Meeting]) -> list[int]:
+        """The rows after which a row runs, with those after meetings that are not in ``visited``."""
+        if row in self.paths:
+            return self.rows_of(self.paths[row], visited)
+        return [one for one in self.before(row) if one >= 0]
+
+    def rows_of(self, statements: Iterable[Source], visited: set[Meeting]) -> list[int]:
+        """The rows among statements of motions, likewise."""
+        found = (self._row(one) for one in expanded(statements, visited))
+        return sorted({row for row in found if row >= 0})
 
     def continues(self) -> Bools:
         """(N,) each motion surely starts where the row before it ends, and no other motion starts there."""
@@ -92,6 +116,10 @@ class TpRows:
         follow[np.arange(-1, n - 1)[plain]] += 1
         for places in self.jumps.values():
             follow[[one for one in places if one != ELSEWHERE]] += 1
+        visited: set[Meeting] = set()
+        for row, sources in self.paths.items():
+            follow[self.starts_of(row, visited)] += 1
+            follow[-1] += START in sources or any(START in one.sources for one in visited)
         return np.asarray(plain & (follow[np.arange(-1, n - 1)] == 1))
 
     def refuse(self, row: int, code: str, message: str) -> None:
@@ -104,11 +132,27 @@ class TpRows:
         known = (b"FINE", b"CR")
         blend = np.array([np.nan if value is None or word not in known else value for word, value in corners])
         stops = np.array([word == b"FINE" for word, _ in corners], np.bool_)
+        visited: set[Meeting] = set()
         for row, surely in self.waits.items():
-            before = [one for one in self.before(row) if one >= 0 and not stops[one]]
+            before = [one for one in self.starts_of(row, visited) if not stops[one]]
             ends = surely and bool(continues[row])
             blend[before], stops[before] = (0.0 if ends else np.nan), ends
         return blend, stops
+
+    def approximation_numbers(self) -> Floats:
+        """(N,) numbers of CNT; below zero those of the registers that have the number of CNT, or of CR, for which the
+        distance is not known; NaN for FINE and for CR with its distance."""
+        numbers = np.full(len(self), np.nan)
+        for row, move in enumerate(self.moves):
+            if move is None or move.corner[0] == b"FINE":
+                continue
+            word, value = move.corner
+            if value is None:
+                digits = re.search(rb"R\[\s*(\d+)", move.termination)
+                numbers[row] = -1.0 - (float(digits[1]) if digits else 0.0) - (_CR if word == b"CR" else 0.0)
+            elif word == b"CNT":
+                numbers[row] = value
+        return numbers
 
 
 class RowBuilder:
@@ -121,7 +165,6 @@ class RowBuilder:
         self.flow: StatementFlow = run.flow
         self.rows = _rows(run)
         self.assigned, self.every_point, self.frames_set = assigned_data(self.flow.statements)
-        self._indices: dict[tuple[bool, int], int] = {}
 
     def build(self) -> TpRows:
         for row, at in enumerate(self.rows.at.tolist()):
@@ -138,10 +181,8 @@ class RowBuilder:
             rows.refuse(row, "FTP007", "the structure of the program is not understood")
         elif state is None:
             rows.refuse(row, "FTP009", "the flow that the program defines does not reach it")
-        elif CONTRADICTORY in (state.force, state.switch):
-            rows.refuse(
-                row, "FTP006", "the FORCE or COMPENSATE comment in force differs with the path of the program"
-            )
+        elif VARYING in (state.force, state.switch):
+            rows.refuse(row, "FTP006", CONTRADICTED)
         elif state.displaced:
             names = ", ".join(sorted(name.decode("latin-1") for name in state.displaced))
             rows.refuse(row, "FTP008", f"its target may be displaced ({names})")
@@ -252,11 +293,7 @@ class RowBuilder:
             return -1
         if selected is None and row not in rows.problems:
             rows.assumed.setdefault(row, name)
-        key = (is_tool, number)
-        if key not in self._indices:
-            self._indices[key] = len(rows.frames)
-            rows.frames.append(FrameRef(number, None, int(rows.lines[row])))
-        return self._indices[key]
+        return rows.frames.index((is_tool, number), lambda: FrameRef(number, None, int(rows.lines[row])))
 
     def _configuration(self, row: int, group: PositionGroup, kind: int) -> tuple[int, int]:
         """Flags and turns of the configuration as numbers, -1 where they are not known."""

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+INSERTED_CNT = 100
+"""Number of CNT of what is inserted where the robot does not stop, into a motion that does."""
+
 
 @dataclass(frozen=True, slots=True)
 class RegisterOperand:

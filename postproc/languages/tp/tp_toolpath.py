@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from functools import partial
 
 import numpy as np
 
-from postproc.base.arrays import Bools, FewRows
+from postproc.base.arrays import Bools
 from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.base.geometry import rotation_from_abc
 from postproc.base.units import DEG, MM
-from postproc.languages.core.row_facts import OTHER_PATHS, grouped, moving_external, only_used
+from postproc.languages.core.motion_sources import Meeting
+from postproc.languages.core.row_facts import (
+    OTHER_PATHS,
+    LockedRows,
+    axis_targets,
+    grouped,
+    moving_external,
+    only_used,
+)
 from postproc.languages.tp.tp_arcs import arcs_of
 from postproc.languages.tp.tp_listing import TpListing
 from postproc.languages.tp.tp_propagation import TpPropagation
 from postproc.languages.tp.tp_remarks import annotate
 from postproc.languages.tp.tp_rows import TpRows
+from postproc.languages.tp.tp_statements import INSERTED_CNT
 from postproc.toolpath import (
     Configuration,
     EditConstraints,
@@ -48,20 +58,17 @@ def toolpath_of(
             kind=kinds,
             position=position,
             rotation=rotation,
-            axes=FewRows(
-                np.array(sorted(rows.axes), np.int32),
-                np.array([rows.axes[row] for row in sorted(rows.axes)]).reshape(-1, 6) * DEG,
-                n,
-            ),
+            axes=axis_targets(rows.axes, n),
             base=rows.base,
             tool=rows.tool,
-            frames=tuple(rows.frames),
+            frames=tuple(rows.frames.refs),
             external=rows.external,
         ),
         line=rows.lines,
         speeds=MotionSpeeds(rows.feed * MM),
         sequence=MotionSequence(
             approximation=blend * MM,
+            approximation_number=rows.approximation_numbers(),
             stops=stops,
             continues=continues,
             predecessors={
@@ -75,6 +82,7 @@ def toolpath_of(
             refused=refused,
             locked=_locked(document, listing, run, rows, runs),
             no_insert_before=_not_before(rows, continues, refused),
+            inserted_number=INSERTED_CNT,
         ),
         orientation_control=OrientationControl(
             mode=np.where(wrist, OrientationMode.JOINT, OrientationMode.VAR).astype(np.int8)
@@ -126,33 +134,26 @@ def _locked(
     runs: Mapping[int, tuple[int, ...]],
 ) -> dict[int, Finding]:
     """Rows from whose end a refused arc starts, or where the program reads the position."""
-    locked: dict[int, Finding] = {}
+    locked = LockedRows(partial(row_finding, document, rows), "FTP012", "FTP002")
 
-    def lock(row: int, code: str, message: str) -> None:
-        if row not in rows.problems:
-            locked.setdefault(row, row_finding(document, rows, row, code, message))
+    def free(places: Iterable[int]) -> list[int]:
+        return [row for row in places if row >= 0 and row not in rows.problems]
 
+    visited: set[Meeting] = set()
+    done: set[int] = set()  # first rows of runs
     for row in rows.problems:
         move = rows.moves[row]
-        if move is None or move.form not in (b"C", b"A"):
-            continue
-        others = [one for one in runs.get(row, ()) if one not in rows.problems]
-        for one in (*rows.before(row), *others):
-            if one >= 0:
-                lock(
-                    one,
-                    "FTP012",
-                    f"the arc in line {rows.lines[row]} starts at this end point and is not corrected",
-                )
+        if move is not None and move.form in (b"C", b"A"):
+            run_of = runs.get(row, ())
+            others = () if not run_of or run_of[0] in done else run_of
+            done.update(others[:1])
+            locked.start_arc(free((*rows.starts_of(row, visited), *others)), int(rows.lines[row]))
+    visited = set()
     for row, move in enumerate(rows.moves):
-        if move is None or not move.relative:
-            continue
-        for one in rows.before(row):
-            if one >= 0:
-                lock(one, "FTP008", f"the motion in line {rows.lines[row]} counts from its end (INC)")
+        if move is not None and move.relative:
+            message = f"the motion in line {rows.lines[row]} counts from its end (INC)"
+            locked.add(free(rows.starts_of(row, visited)), "FTP008", message)
+    visited = set()
     for at, places in sorted(run.reads.items()):
-        for place in sorted(places):
-            if place >= 0:
-                message = f"line {listing.statements[at].line} reads the end position of this motion"
-                lock(int(rows.row_of[place]), "FTP002", message)
-    return dict(sorted(locked.items()))
+        locked.are_read(free(rows.rows_of(places, visited)), listing.statements[at].line)
+    return locked.done()

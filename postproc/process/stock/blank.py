@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
+from postproc.process.stock.borrowed import borrowed
 from postproc.process.stock.compiled import compiled
 
 BOX, CYLINDER, MESH = 0, 1, 2
@@ -102,9 +103,16 @@ def _near_pairs(blank: Blank) -> tuple[Ints, Ints]:
 
 
 @compiled
+def lent_blank(blank: Blank) -> Blank:
+    """The same blank, for compiled code that does not count references to it."""
+    return Blank(borrowed(blank.frame), borrowed(blank.corners), borrowed(blank.lists))
+
+
+@compiled
 def _near(blank: Blank, cell: Ints, triangle: Ints) -> int:
     """The cells to which each triangle is near, and that triangle, put into arrays that have room; their number."""
     count = 0
+    blank, cell, triangle = lent_blank(blank), borrowed(cell), borrowed(triangle)
     frame, corners = blank.frame, blank.corners
     size, reach = frame[_SIZE], frame[_REACH]
     limit = reach + size * np.sqrt(0.75)
@@ -130,6 +138,7 @@ def _near(blank: Blank, cell: Ints, triangle: Ints) -> int:
 
 @compiled
 def _mark_solid(blank: Blank, solid: Ints) -> None:
+    blank = lent_blank(blank)
     frame = blank.frame
     nx, ny, nz = int(frame[_SHAPE]), int(frame[_SHAPE + 1]), int(frame[_SHAPE + 2])
     size = frame[_SIZE]

@@ -11,7 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
-from postproc.process.stock.blank import Blank, blank_distance, corners_of
+from postproc.process.stock.blank import Blank, blank_distance, corners_of, lent_blank
+from postproc.process.stock.borrowed import borrowed
+from postproc.process.stock.bounds import BOUND_COLUMNS, is_far, may_be_bounded, set_bound
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.distance import (
     ACROSS,
@@ -46,11 +48,13 @@ class Stock(NamedTuple):
     blank: see ``Blank``; sweeps (M, ROW), cutters (T, 6): see ``distance``; grid (5,): size [m] of the cells, how far
     distances are known [m], and the numbers of cells from the blank's lowest corner; first (C + 1,) and near
     (E,): the sweeps that come that near to each cell, ascending; stop (E,): the last of the sweeps from that of
-    ``near`` on that go on in one line and are near.
+    ``near`` on that go on in one line and are near.  bounds (M, BOUND_COLUMNS): of the sweeps, see ``bounds``, or of
+    none (0, BOUND_COLUMNS); whoever changes a sweep sets its bound again.
     """
 
     blank: Blank
     sweeps: Floats
+    bounds: Floats
     cutters: Floats
     grid: Floats
     first: Ints
@@ -78,7 +82,9 @@ def build_stock(
     cells = int(np.prod(shape))
     none = np.zeros(1, np.int32)
     grid = np.array([size, max(0.5 * size, reach), *shape], float)
-    stock = Stock(blank, sweeps, cutters, grid, np.zeros(1, np.int64), none, none)
+    bounds = np.zeros((len(sweeps) if may_be_bounded(sweeps) else 0, BOUND_COLUMNS))
+    _set_bounds(sweeps, cutters, bounds)
+    stock = Stock(blank, sweeps, bounds, cutters, grid, np.zeros(1, np.int64), none, none)
     count, covered = np.zeros(cells, np.int64), np.full(cells, np.iinfo(np.int32).max, np.int32)
     _mark_outside(stock, covered)
     live = np.full((len(sweeps), 2), [np.inf, -np.inf])
@@ -108,7 +114,30 @@ def _go_on(sweeps: Floats) -> Bools:
 
 
 @compiled
+def lent_stock(stock: Stock) -> Stock:
+    """The same stock, for compiled code that does not count references to it."""
+    return Stock(
+        lent_blank(stock.blank),
+        borrowed(stock.sweeps),
+        borrowed(stock.bounds),
+        borrowed(stock.cutters),
+        borrowed(stock.grid),
+        borrowed(stock.first),
+        borrowed(stock.near),
+        borrowed(stock.stop),
+    )
+
+
+@compiled
+def _set_bounds(sweeps: Floats, cutters: Floats, bounds: Floats) -> None:
+    sweeps, cutters, bounds = borrowed(sweeps), borrowed(cutters), borrowed(bounds)
+    for j in range(len(bounds)):
+        set_bound(sweeps, cutters, j, bounds[j])
+
+
+@compiled
 def _mark_outside(stock: Stock, covered: Ints) -> None:
+    stock = lent_stock(stock)
     blank, size = stock.blank, stock.grid[0]
     low = blank.frame[1:4]
     shape = stock.grid[2:].astype(np.int64)
@@ -190,7 +219,8 @@ def _list(
     line, of which each ``joins`` (M,) the one before it, are looked at together: which of them are near a cell, and
     which covers it first, follows from where the cell is along the line.  With a ``slack`` each is listed for itself.
     """
-    count, near, stop = lists
+    stock, joins, live, covered = lent_stock(stock), borrowed(joins), borrowed(live), borrowed(covered)
+    count, near, stop = borrowed(lists[0]), borrowed(lists[1]), borrowed(lists[2])
     sweeps, cutters, size = stock.sweeps, stock.cutters, stock.grid[0]
     low = stock.blank.frame[1:4]
     shape = stock.grid[2:].astype(np.int64)
@@ -270,6 +300,8 @@ def _list(
                             if along + wide >= 0.0 and along - wide <= ends[e - s + 1]:
                                 covers = s + _place_of(ends, e - s + 1, along - wide)
                     else:
+                        if is_far(stock.bounds, cutters, s, x, y, z, limit):
+                            continue
                         d = swept_distance(sweeps, cutters, s, x, y, z, limit)
                         if d > limit:
                             continue
@@ -361,13 +393,16 @@ def _nearest(stock: Stock, x: float, y: float, z: float, time: int, depth: float
     while place >= start:
         # on the positive side only a smaller distance counts
         first, last = int(stock.near[place]), min(int(stock.stop[place]), time - 1)
-        if first == last:
-            d = swept_distance(stock.sweeps, stock.cutters, last, x, y, z, max(best, depth))
+        place -= 1
+        enough = max(best, depth)
+        if first != last:
+            d = line_distance(stock.sweeps, stock.cutters, first, last, x, y, z, enough)
+        elif is_far(stock.bounds, stock.cutters, last, x, y, z, enough):
+            continue
         else:
-            d = line_distance(stock.sweeps, stock.cutters, first, last, x, y, z, max(best, depth))
+            d = swept_distance(stock.sweeps, stock.cutters, last, x, y, z, enough)
         if d < best:
             best, owner, end = d, first, last
             if best <= -reach:
                 return -reach, owner, end
-        place -= 1
     return best, owner, end

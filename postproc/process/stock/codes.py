@@ -193,10 +193,42 @@ CODES = define(
         "STK024": Code(
             "warning",
             "feed per tooth is implausible",
-            meaning="The feed per tooth is below 0.0005 mm, or above a fifth of the diameter.",
+            meaning="The feed per tooth is below 0.0005 mm, or above a tenth of the diameter.",
             consequence="Feed or speed have probably another unit than stated, and the forces are as wrong.",
             action="Compare F, its unit (G94, G95, mm, inches), S and the number of teeth with the machine.",
             example="`F3.6`, meant in m/min, at 12000 1/min: 0.0001 mm per tooth.",
+        ),
+        "STK025": Code(
+            "warning",
+            "size of the tool contradicts the program",
+            meaning="The cell states another diameter, or no tool of the stated size cuts what the program does.",
+            consequence="Forces, corrections and the reported part belong to another tool.",
+            action="State diameter, length and holder in mm, the diameter and not the radius, the spindle in 1/min.",
+            example="`diameter: 0.63` (inches) for a cutter of 16 mm that cuts 8 mm deep.",
+        ),
+        "STK026": Code(
+            "warning",
+            "size of the blank contradicts the program",
+            meaning="The program moves at a feed far beyond the blank, or the blank is far larger than the program.",
+            consequence="Most of the program seems to be in air, or cuts what is not there.",
+            action="State the blank in mm; scale an STL: `stl: {file: blank.stl, scale: 25.4}`.",
+            example="`box: [[0, 0, -1.2], [4.7, 3.1, 0]]` (inches) for a part of 120 mm.",
+        ),
+        "STK027": Code(
+            "warning",
+            "tool cuts nothing",
+            meaning="The program moves this tool at a feed, and it meets no stock.",
+            consequence="Its motions have no force and are not corrected.",
+            action="Compare the top of the blank, the tool's number and its shape with the program.",
+            example="A finishing tool above a blank whose top is stated 2 mm too low.",
+        ),
+        "STK028": Code(
+            "warning",
+            "force or coefficients are implausible",
+            meaning="The coefficients are those of no material, or force or power are beyond any robot.",
+            consequence="The correction is wrong by as much.",
+            action="State ktc, krc, kac in N/mm2 and kte, kre, kae in N/mm.",
+            example="`kte: 27700` in N/m, where 27.7 N/mm is meant.",
         ),
     }
 )

@@ -6,7 +6,8 @@ import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 from postproc.base.units import MM
-from postproc.process.stock.cells import Stock
+from postproc.process.stock.borrowed import borrowed, keep_alive
+from postproc.process.stock.cells import Stock, lent_stock
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.contact import (
     BOUND,
@@ -14,6 +15,7 @@ from postproc.process.stock.contact import (
     SweepCutters,
     find_arcs,
     height_range,
+    lent_cutters,
     set_pose,
 )
 from postproc.process.stock.distance import CUTTER, REMOVES
@@ -81,10 +83,14 @@ def collisions(
 
     sweep (K,) and the share (K,) of it.
     """
-    pose = np.zeros((6, 3))
+    stock, cutters = lent_stock(stock), lent_cutters(cutters)
+    sweep, share, part, found = borrowed(sweep), borrowed(share), borrowed(part), borrowed(found)
+    own = np.zeros((6, 3))
+    pose = borrowed(own)
     for k in range(len(sweep)):
         j = sweep[k]
         set_pose(stock.sweeps, j, share[k], cutters.headings[j], pose)
         time = j + 1 if stock.sweeps[j, REMOVES] > 0.0 else j
         profile = cutters.profiles[int(stock.sweeps[j, CUTTER])]
         found[k] = 1 if collides(stock, profile, part[k], pose, time) else 0
+    keep_alive(own)

@@ -23,7 +23,8 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
-from postproc.process.stock.cells import Stock, stock_distance
+from postproc.process.stock.borrowed import borrowed, keep_alive
+from postproc.process.stock.cells import Stock, lent_stock, stock_distance
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.distance import (
     ANGLE,
@@ -235,7 +236,24 @@ def _set_node(
     stock: Stock, cutter: SweepCutter, e: int, s: float, pose: Floats, contact: Floats, node: Floats
 ) -> None:
     """What the circle at the length ``s`` [m] of the element ``e`` of a profile adds, by the metre of profile."""
-    element, law, arc = cutter.profile[e], cutter.law, np.zeros(12)
+    own = np.zeros(12)
+    _set_node_by(stock, cutter, e, s, pose, contact, node, borrowed(own))
+    keep_alive(own)
+
+
+@compiled
+def _set_node_by(
+    stock: Stock,
+    cutter: SweepCutter,
+    e: int,
+    s: float,
+    pose: Floats,
+    contact: Floats,
+    node: Floats,
+    arc: Floats,
+) -> None:
+    """``_set_node``; arc (12,): of ``find_arcs``."""
+    element, law = cutter.profile[e], cutter.law
     if element[1] == 0.0:
         share = s / element[7]
         r = element[2] + share * (element[4] - element[2])
@@ -329,8 +347,9 @@ def find_contact(stock: Stock, cutter: SweepCutter, pose: Floats, contact: Float
     contact[:] = 0.0
     contact[LOW], contact[HIGH], contact[ENTRY], contact[EXIT] = np.inf, -np.inf, np.inf, -np.inf
     contact[RIGHT], contact[LEFT] = np.inf, -np.inf
-    left, middle, total = np.zeros(_NODE), np.zeros(_NODE), np.zeros(8)
-    nodes, starts, rough = np.zeros((64, _NODE)), np.zeros((_MOST_PARTS + 1, _NODE)), np.zeros(8)
+    own, total, rough = np.zeros((67 + _MOST_PARTS, _NODE)), np.zeros(8), np.zeros(8)
+    every = borrowed(own)
+    left, middle, nodes, starts = every[0], every[1], every[2:66], every[66:]
     for e in range(len(profile)):
         element = profile[e]
         if element[0] != 0.0:
@@ -398,17 +417,30 @@ def find_contact(stock: Stock, cutter: SweepCutter, pose: Floats, contact: Float
                 else:
                     top += 1
                     nodes[top] = middle
+    keep_alive(own)
     contact[RATE] = total[0]
     for k in range(6):
         contact[FORCE + k] = total[1 + k]
 
 
 @compiled
+def lent_cutters(cutters: SweepCutters) -> SweepCutters:
+    """The same, for compiled code that does not count references to it."""
+    return SweepCutters(
+        borrowed(cutters.profiles), borrowed(cutters.laws), borrowed(cutters.live), borrowed(cutters.headings)
+    )
+
+
+@compiled
 def contacts(stock: Stock, cutters: SweepCutters, sweep: Ints, share: Floats, found: Floats) -> None:
     """``found`` (K, COLUMNS) of K poses: sweep (K,) and the share (K,) of it."""
-    pose = np.zeros((6, 3))
+    stock, cutters = lent_stock(stock), lent_cutters(cutters)
+    sweep, share, found = borrowed(sweep), borrowed(share), borrowed(found)
+    own = np.zeros((6, 3))
+    pose = borrowed(own)
     for k in range(len(sweep)):
         j = sweep[k]
         set_pose(stock.sweeps, j, share[k], cutters.headings[j], pose)
         profile = cutters.profiles[int(stock.sweeps[j, CUTTER])]
         find_contact(stock, SweepCutter(profile, cutters.laws[j], cutters.live[j], j), pose, found[k])
+    keep_alive(own)

@@ -19,8 +19,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from postproc.base.arrays import Floats, Ints
-from postproc.process.stock.cells import Stock
+from postproc.base.arrays import Floats
+from postproc.process.stock.borrowed import borrowed, keep_alive
+from postproc.process.stock.bounds import set_bound
+from postproc.process.stock.cells import Stock, lent_stock
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.contact import (
     COLUMNS,
@@ -31,6 +33,7 @@ from postproc.process.stock.contact import (
     find_contact,
     set_pose,
 )
+from postproc.process.stock.coupled_pieces import Nodes, Pieces, lent_nodes, lent_pieces
 from postproc.process.stock.displaced import displace_row
 from postproc.process.stock.distance import CUTTER, rotated, speed_bound
 
@@ -59,41 +62,6 @@ _VARIED_SHARE = 0.01
 _ALONG_SPINDLE = 0.0174524  # within a degree of it no direction across it is known
 
 
-class Pieces(NamedTuple):
-    """P pieces of sweeps in the order in which they run.
-
-    rows (P, ROW): as programmed; laws (P, 9), live (P, 2), heading (P, 3): as of ``SweepCutters``; start, end (P,):
-    their nodes; fresh (P,): 1 where the node at the start is solved, 0 where it is the end of the piece before;
-    earlier: sweeps of the stock before the first of them; known: 1 where the wrenches of the nodes are near the
-    solution, 0 where that of the place before is a better guess.
-    """
-
-    rows: Floats
-    laws: Floats
-    live: Floats
-    heading: Floats
-    start: Ints
-    end: Ints
-    fresh: Ints
-    earlier: int
-    known: int
-
-
-class Nodes(NamedTuple):
-    """K places of paths, in the axes of the stock, wrenches [N, N m] about the tip.
-
-    base (K, 6): displacement without wrench, shift [m] and turn [rad]; slope (K, 6, 6): its derivative by the wrench;
-    wrench (K, 6): of the nominal engagement, to be replaced by the solution; residual (K,) [m]: what remains between
-    both displacements; area (K,) [m2]: removed area across the feed.
-    """
-
-    base: Floats
-    slope: Floats
-    wrench: Floats
-    residual: Floats
-    area: Floats
-
-
 class ToolAtNode(NamedTuple):
     """The tool at one node, and what its displacements are tried with.
 
@@ -115,9 +83,16 @@ def solve_pieces(stock: Stock, profiles: Floats, pieces: Pieces, nodes: Nodes, l
 
     profiles (T, E, 8): as of ``contacts``; lever [m]: how far from the tip a turn of the tool counts.
     """
-    pose, came = np.zeros((6, 3)), np.zeros(4)
-    moved, contact = np.zeros((6, 3)), np.zeros(COLUMNS)
-    first, last, whole = np.zeros(6), np.zeros(6), np.array([0.0, 1.0])
+    stock, profiles, pieces, nodes = (
+        lent_stock(stock),
+        borrowed(profiles),
+        lent_pieces(pieces),
+        lent_nodes(nodes),
+    )
+    own, numbers, whole = np.zeros((12, 3)), np.zeros((4, max(COLUMNS, 6))), np.array([0.0, 1.0])
+    poses, rows = borrowed(own), borrowed(numbers)
+    pose, moved = poses[:6], poses[6:]
+    came, contact, first, last = rows[0, :4], rows[1, :COLUMNS], rows[2, :6], rows[3, :6]
     for p in range(len(pieces.rows)):
         profile = profiles[int(pieces.rows[p, CUTTER])]
         time = pieces.earlier + p
@@ -140,6 +115,10 @@ def solve_pieces(stock: Stock, profiles: Floats, pieces: Pieces, nodes: Nodes, l
             _solve_as_programmed(tool, nodes, a, b, lever)
         _displacement(nodes, b, nodes.wrench[b], last)
         displace_row(pieces.rows, p, whole, first, last, lever, AS_STRAIGHT, stock.sweeps[time])
+        if len(stock.bounds):
+            set_bound(stock.sweeps, stock.cutters, time, stock.bounds[time])
+    keep_alive(own)
+    keep_alive(numbers)
 
 
 @compiled

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.base.arrays import Floats
+from postproc.process.stock.borrowed import borrowed
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.distance import (
     ANGLE,
@@ -45,6 +46,13 @@ def displaced_rows(
 def _displace_rows(
     rows: Floats, part: Floats, first: Floats, last: Floats, lever: float, even: float, out: Floats
 ) -> None:
+    rows, part, first, last, out = (
+        borrowed(rows),
+        borrowed(part),
+        borrowed(first),
+        borrowed(last),
+        borrowed(out),
+    )
     for k in range(len(rows)):
         displace_row(rows, k, part[k], first[k], last[k], lever, even, out[k])
 

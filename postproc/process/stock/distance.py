@@ -24,7 +24,7 @@ _PLACE = 1e-9  # m: of the place on a line where it is nearest
 _SHORT, _FEET = (
     1e-6,
     6,
-)  # m: the place of a foot on the way of a ball, and the steps to it: errors are its square by R
+)  # m: the place of a foot along the path of a ball, and the steps to it: errors are its square by R
 
 
 TIP_POINT, STEP, AXIS, TURN, CENTRE, NORMAL, ANGLE, MODE, CUTTER, REMOVES = 0, 3, 6, 9, 12, 15, 18, 19, 20, 21

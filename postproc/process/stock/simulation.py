@@ -15,6 +15,7 @@ from postproc.cell import MotionFrames
 from postproc.process.force_profiles import ForceProfiles
 from postproc.process.stated_forces import BASE, FEED, StatedForces
 from postproc.process.stock.blank import Blank, box_blank, corners_of, cylinder_blank, mesh_blank
+from postproc.process.stock.contradictions import contradictions
 from postproc.process.stock.cutters import CUTTING, HOLDER, SHANK
 from postproc.process.stock.distance import AXIS, CUTTER, REMOVES, STEP, TIP_POINT, TURN
 from postproc.process.stock.engagement import EngagedMotions, engage, laws_of
@@ -22,14 +23,14 @@ from postproc.process.stock.motion_sweeps import MotionSweeps, find_sweeps
 from postproc.process.stock.saved_stock import Removed, read_stock, stock_bytes
 from postproc.process.stock.stl import read_stl
 from postproc.process.stock.stock_section import StockProcess, read_stock_process
-from postproc.process.stock.tool_comments import CommentedTool, read_tool_comments
+from postproc.process.stock.tool_comments import CommentedTool, read_named_diameters, read_tool_comments
 from postproc.toolpath import Kind, Toolpath
 
 _PARTS = {CUTTING: "the cutter", SHANK: "the shank", HOLDER: "the holder"}
 _MOST_FINDINGS = 20
 _NO_MOVE = 1e-7  # m
 _SAME_SPEED = 0.001
-_LEAST_CHIP, _LARGEST_CHIP = 0.0005 * MM, 0.2
+_LEAST_CHIP, _LARGEST_CHIP = 0.0005 * MM, 0.1
 """[m] and of the diameter: feeds per tooth beyond have another unit than it seems."""
 _SMALL = 10 * MM  # a blank that is no longer, or one of 10 m in metres
 
@@ -78,13 +79,28 @@ def simulate(path: Path, toolpath: Toolpath, frames: MotionFrames, program: str)
         *_collisions(engagement, toolpath, program),
         *_not_simulated(sweeps, toolpath, program),
         *_lengths(sweeps, process),
-        *_commented(sweeps, commented, program),
+        *_commented(sweeps, commented, toolpath, program),
         *_implausible_chips(
             sweeps, laws_of(sweeps, toolpath, edges)[:, 0], engagement.cuts, toolpath, program
         ),
         *_speeds(sweeps, engagement.cuts, process, toolpath, program),
+        *contradictions(
+            process, sweeps, engagement, toolpath, frames.diameters, _tips(toolpath, frames), program
+        ),
     ]
     return StockRun(process, toolpath, blank, before, sweeps, engagement, ci95, tuple(findings))
+
+
+def _tips(toolpath: Toolpath, frames: MotionFrames) -> dict[int, float]:
+    """Number of a tool -> how far its tip is from the flange [m]."""
+    tools, first = np.unique(toolpath.tool, return_index=True)
+    away = np.linalg.norm(frames.tool_in_flange.position[first], axis=1)
+    numbers = [toolpath.frames[index].number if index >= 0 else None for index in tools.tolist()]
+    return {
+        number: far
+        for number, far in zip(numbers, away.tolist(), strict=True)
+        if number is not None and np.isfinite(far)
+    }
 
 
 def _blank(process: StockProcess) -> tuple[Blank, Removed | None]:
@@ -268,12 +284,23 @@ def _lengths(sweeps: MotionSweeps, process: StockProcess) -> list[Finding]:
     ]
 
 
-def _commented(sweeps: MotionSweeps, commented: Mapping[int, CommentedTool], program: str) -> list[Finding]:
+def _commented(
+    sweeps: MotionSweeps, commented: Mapping[int, CommentedTool], toolpath: Toolpath, program: str
+) -> list[Finding]:
     """What is taken from comments of the program, and where the process file states other tools."""
     findings = []
+    named = read_named_diameters(toolpath)
     for cutter in sweeps.cutters:
         tool = commented.get(cutter.number)
         if tool is None:
+            for one in named.get(cutter.number, ()):
+                if not one.may_be(2 * cutter.radius):
+                    message = (
+                        f"this comment names {one.words} for tool {cutter.number}; the process file states"
+                        f" {cutter.shape}, diameter {2 * cutter.radius / MM:g} mm, which is used"
+                    )
+                    findings.append(Finding("STK019", message, program, one.line))
+                    break
             continue
         same = (cutter.shape, cutter.radius, cutter.corner) == (tool.shape, tool.radius, tool.corner)
         near = (
@@ -372,4 +399,8 @@ def _beside(
     message = f"no motion cuts: the blank is in {box(low, high)}, and {moves} (mm)"
     small = float((high - low).max()) < _SMALL
     help = "The blank is stated in mm: is it in metres?" if small else ""
+    swallowed = [cutter for cutter in sweeps.cutters if 2 * cutter.radius > float((high - low)[:2].max())]
+    if swallowed and not small:
+        wide = ", ".join(f"tool {one.number} {2 * one.radius / MM:.6g} mm" for one in swallowed)
+        help = f"The diameter is larger than the blank ({wide}): is it in mm?"
     return Finding("STK008", message, str(process.path), process.line, help=help)

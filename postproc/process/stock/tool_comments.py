@@ -8,6 +8,8 @@ The posts of Autodesk Fusion and HSM list the tools at the start of a program:
 with lengths in the unit of the program, which the comment does not name.  It follows from ``ZMIN``, the lowest place of
 the tip: a comment is read only where the motions of that tool go down to it either in mm or in inches, and not in both.
 Comments of other posts (FreeCAD, Mastercam) name a tool as the user called it, or state no type: they are not read.
+Where such a comment names a size, ``16mm Endmill`` or ``DIA. - 10.``, and that is not the diameter that the process
+file states, one of them is wrong.
 """
 
 from __future__ import annotations
@@ -29,6 +31,62 @@ _COMMENT = re.compile(
 _SHAPES = {"flat end mill": "flat", "ball end mill": "ball", "bullnose end mill": "bull", "drill": "drill"}
 _UNITS = (1.0, 25.4)  # mm
 _SAME = 0.002  # of the unit: posts write three decimals
+
+
+_UNIT = r"(mm|inch(?:es)?|in|\")(?!\w)"
+_NOUN = r"(?:end ?mills?|ball ?mills?|face ?mills?|ball ?noses?|bull ?noses?|drills?|cutters?)(?!\w)"
+_OTHER = re.compile(r"holder|shank|stock|blank|hole|pocket|bore|helix|thread", re.IGNORECASE)
+_NUMBERED = re.compile(r"(?<!\w)(?:T|TOOL)[ :=#-]{0,3}(\d++)", re.IGNORECASE)
+_NAMED = re.compile(_NOUN, re.IGNORECASE)
+_SIZES = (
+    re.compile(rf"(?<![\w./]){_NUMBER} ?{_UNIT} ?(?:[a-z]++ ){{0,2}}{_NOUN}", re.IGNORECASE),
+    re.compile(rf"(?<!\w){_NOUN} ?(?:dia(?:meter)?\.?|d)? ?[=:,-]? ?{_NUMBER} ?{_UNIT}", re.IGNORECASE),
+    re.compile(rf"(?<!\w)(?:d ?[=:]|dia(?:meter)?\.? ?[=:-]?) ?{_NUMBER}(?: ?{_UNIT})?", re.IGNORECASE),
+)
+_NEAR = 0.02
+
+
+@dataclass(frozen=True)
+class NamedDiameter:
+    """A diameter that a comment in ``line`` names: its number, and its unit [mm], None where it names none."""
+
+    value: float
+    unit: float | None
+    line: int
+
+    @property
+    def words(self) -> str:
+        """As it is there, for messages."""
+        unit = {1.0: " mm", 25.4: " inches"}.get(self.unit or 0.0, "")
+        return f"{self.value:g}{unit}"
+
+    def may_be(self, diameter: float) -> bool:
+        """Whether it is ``diameter`` [m], in its unit or, without one, in any."""
+        units = _UNITS if self.unit is None else (self.unit,)
+        return any(abs(self.value * unit * MM - diameter) <= _NEAR * diameter for unit in units)
+
+
+def read_named_diameters(toolpath: Toolpath) -> dict[int, list[NamedDiameter]]:
+    """Number of a tool -> the diameters that comments name for it, where a comment names one only."""
+    numbers = np.array([frame.number or 0 for frame in toolpath.frames] + [0])[toolpath.tool]
+    found: dict[int, list[NamedDiameter]] = {}
+    for comment in toolpath.comments:
+        text = " ".join(comment.text.split())
+        numbered = _NUMBERED.search(text)
+        if _OTHER.search(text) or not (numbered or _NAMED.search(text)):
+            continue
+        sizes = {
+            (float(match[1]), (25.4 if match[2][0] in 'iI"' else 1.0) if match[2] else None)
+            for form in _SIZES
+            for match in form.finditer(text)
+        }
+        values = {value for value, _ in sizes}
+        if len(values) != 1 or min(values) <= 0 or not len(numbers):
+            continue
+        number = int(numbered[1]) if numbered else int(numbers[min(comment.row, len(numbers) - 1)])
+        unit = next((unit for _, unit in sizes if unit is not None), None)
+        found.setdefault(number, []).append(NamedDiameter(min(values), unit, comment.line))
+    return found
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,8 @@ void main() { ink = vec4(colour, 1.0); }`],
 const FORCE = [0.0, 0.62, 0.36];
 const MOVING_POINTS = 40000, STRIDES = 31; // of the path while the view moves; WebGL's largest stride is 255 bytes
 const INSET = 0.3;
+// While the view moves and frames take longer than SLOW ms: 1 the surface by COARSE places, 2 in half the resolution.
+const SLOW = 40, COARSE = 5000, LEVELS = 2;
 
 function numbersOf(text, kind) {
   const letters = atob(text), raw = new Uint8Array(letters.length);
@@ -69,6 +71,8 @@ class PartView {
     this.middle = [0, 0, 0];
     this.whole = false;
     this.cell = [[0, 0, 0], [0, 0, 0]];
+    this.level = 0;
+    this.coarse = [];
     if (!this.load()) { this.gl = null; return; }
     this.unpack();
     this.look('oblique');
@@ -98,8 +102,7 @@ class PartView {
     gl.bindVertexArray(surface.array);
     this.feed('surface', 'place', numbersOf(this.data.vertices), [3, gl.UNSIGNED_SHORT, true, 8, 0]);
     this.feed('surface', 'error', numbersOf(this.data.errors), [2, gl.SHORT, true, 4, 0]);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, numbersOf(this.data.faces), gl.STATIC_DRAW);
+    this.faces = this.indices(numbersOf(this.data.faces, Uint32Array));
     gl.uniform3fv(surface.at('extent'), this.data.extent);
     gl.uniform3fv(surface.at('bands'), this.data.bands.flat().map((value) => value / 255));
     gl.uniform1f(surface.at('unit'), this.data.range / (0.5 * this.data.tolerance));
@@ -108,6 +111,43 @@ class PartView {
     ['place', 'normal', 'colour'].forEach((name, k) => this.point('bodies', name, [3, gl.FLOAT, false, 4 * FLOATS, 12 * k]));
     gl.enable(gl.DEPTH_TEST);
     return true;
+  }
+
+  indices(values) {
+    const { gl } = this, buffer = gl.createBuffer();
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffer);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, values, gl.STATIC_DRAW);
+    return { buffer, count: values.length };
+  }
+
+  // The surface of a side in fewer triangles: of the places in a cell that with the largest error stands for all.
+  coarser(side) {
+    if (this.coarse[side]) return this.coarse[side];
+    const { extent } = this.data, [a, b, c] = extent;
+    const cell = Math.sqrt((2 * (a * b + b * c + c * a)) / COARSE);
+    const places = numbersOf(this.data.vertices, Uint16Array), errors = numbersOf(this.data.errors, Int16Array);
+    const faces = numbersOf(this.data.faces, Uint32Array), owner = new Uint32Array(places.length / 4), cells = new Map();
+    const size = (i) => { const e = errors[2 * i + side]; return e < -32766 ? -1 : Math.abs(e); };
+    const across = extent.map((value) => Math.floor(value / cell) + 1), keys = new Uint32Array(owner.length);
+    for (let i = 0; i < owner.length; i++) {
+      const [x, y, z] = [0, 1, 2].map((k) => Math.floor(((places[4 * i + k] / 65535) * extent[k]) / cell));
+      keys[i] = (x * across[1] + y) * across[2] + z;
+      const first = cells.get(keys[i]);
+      if (first === undefined || size(i) > size(first)) cells.set(keys[i], i);
+    }
+    for (let i = 0; i < owner.length; i++) owner[i] = cells.get(keys[i]);
+    const kept = [], seen = new Set(), many = owner.length;
+    for (let f = 0; f < faces.length; f += 3) {
+      const corners = [owner[faces[f]], owner[faces[f + 1]], owner[faces[f + 2]]], [i, j, k] = corners;
+      if (i === j || j === k || k === i) continue;
+      const [low, middle, high] = [...corners].sort((one, other) => one - other);
+      const name = (low * many + middle) * many + high;
+      if (seen.has(name)) continue;
+      seen.add(name);
+      kept.push(i, j, k);
+    }
+    this.coarse[side] = this.indices(new Uint32Array(kept));
+    return this.coarse[side];
   }
 
   feed(name, attribute, raw, how) {
@@ -221,11 +261,21 @@ class PartView {
     this.stale ||= moved;
     if (this.waiting || !this.gl) return;
     this.waiting = true;
-    requestAnimationFrame(() => { this.waiting = false; this.paint(); });
+    requestAnimationFrame((now) => { this.waiting = false; this.watch(now); this.paint(); });
+  }
+
+  // Frames of a moving view that take too long, two in a row: from now on it moves with less detail.
+  watch(now) {
+    const slow = this.moving && this.before !== undefined && now - this.before > SLOW;
+    this.slow = slow ? (this.slow || 0) + 1 : 0;
+    if (this.slow > 1 && this.level < LEVELS) [this.level, this.slow] = [this.level + 1, 0];
+    this.before = this.moving ? now : undefined;
+    this.canvas.dataset.level = this.moving ? this.level : 0;
   }
 
   paint() {
-    const { gl, canvas } = this, dense = window.devicePixelRatio || 1;
+    const { gl, canvas } = this, dense = (window.devicePixelRatio || 1) * (this.moving && this.level > 1 ? 0.5 : 1);
+    this.dense = dense;
     const [wide, high] = [canvas.clientWidth, canvas.clientHeight];
     if (!wide || !high) return;
     if (canvas.width !== Math.round(wide * dense) || canvas.height !== Math.round(high * dense)) {
@@ -253,7 +303,7 @@ class PartView {
   // All of it into [x, y, wide, high] of the canvas, with half of `box` and `middle` as what fills it; `small`: the
   // robot and where the part is.
   draw([x, y, wide, high], axes, box, middle, zoom, shift, small = false) {
-    const { gl } = this, dense = window.devicePixelRatio || 1;
+    const { gl, dense } = this;
     gl.viewport(x * dense, y * dense, wide * dense, high * dense);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     const span = axes.slice(0, 2).map((axis) => axis.reduce((sum, a, k) => sum + 2 * Math.abs(a) * box[k], 0));
@@ -270,7 +320,9 @@ class PartView {
     };
     if (!small) {
       gl.uniform1f(use('surface')('side'), this.side);
-      gl.drawElements(gl.TRIANGLES, this.data.corners, gl.UNSIGNED_INT, 0);
+      const { buffer, count: corners } = this.moving && this.level ? this.coarser(this.side) : this.faces;
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffer);
+      gl.drawElements(gl.TRIANGLES, corners, gl.UNSIGNED_INT, 0);
     }
     use('bodies');
     gl.drawArrays(gl.TRIANGLES, 0, this.split);

@@ -49,7 +49,7 @@ class Playback {
     this.frame = requestAnimationFrame((next) => this.step(next));
   }
 
-  // A motion was chosen: by somebody, or on the way.
+  // A motion was chosen: by somebody, or by the playback.
   chosen() {
     this.view.share = 1;
     if (this.playing && !this.own) this.at = this.length[chosen];
@@ -78,6 +78,7 @@ function showPart() {
   live.hidden = false;
   const canvas = byId('part'), view = new PartView(canvas, JSON.parse(place.textContent));
   if (!view.gl) { live.hidden = true; return; }
+  canvas.view = view; // for scripts beside the page's
   byId('part-static').hidden = true;
   listenToInput(view);
   const play = new Playback(view), said = byId('part-line');

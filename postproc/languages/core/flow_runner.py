@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from heapq import heappop, heappush
+from typing import Any, Generic, Protocol, TypeVar
 
+from postproc.languages.core.flow_graph import FlowGraph
 from postproc.languages.core.motion_sources import Meeting
-from postproc.languages.rapid.flow_graph import FlowGraph
-from postproc.languages.rapid.program_state import ProgramState
 
 UNROLLED = 10_000
 """Statements in loops up to which these are run by themselves, in a run of a routine and what it calls; further ones
@@ -25,19 +25,36 @@ LONG = 8
 KEPT = 3
 """Runs that are remembered."""
 
-Led = list[tuple[int, ProgramState]]
-"""Where a block leads, and what holds there."""
-After = Callable[[FlowGraph, int, ProgramState], Led]
+
+class FlowState(Protocol):
+    """What holds at a place of a program."""
+
+    def copy(self: State) -> State: ...
+
+    def join(self: State, other: State, meeting: Meeting) -> bool:
+        """Takes in what holds where another path meets this one, at the place of ``meeting``; whether anything
+        changed."""
+
+    def is_same(self: State, other: State) -> bool:
+        """Whether the same holds in both."""
 
 
-class RoutineRunner:
+State = TypeVar("State", bound=FlowState)
+Graph = TypeVar("Graph", bound=FlowGraph[Any, Any, Any])
+
+
+class FlowRunner(Generic[Graph, State]):
     """``after``: runs a block, and gives where it leads and what holds there; ``version``: a number that changes where
     that may become another one; ``recording``: what runs is taken up."""
 
-    def __init__(self, after: After, version: Callable[[], int]) -> None:
+    def __init__(
+        self,
+        after: Callable[[Graph, int, State], list[tuple[int, State]]],
+        version: Callable[[], int] = lambda: 0,
+    ) -> None:
         self._run_block, self._version = after, version
         self.recording = False
-        self._known: dict[tuple[int, int], list[tuple[ProgramState, int, Led]]] = {}
+        self._known: dict[tuple[int, int], list[tuple[State, int, list[tuple[int, State]]]]] = {}
         self._left = 0  # statements and blocks that can still be run in loops
         self._deep = 0  # loops in each other
         self._unknown = 0  # loops that are run until nothing changes
@@ -46,10 +63,10 @@ class RoutineRunner:
         """Starts a run of the program."""
         self._left = UNROLLED
 
-    def run(self, graph: FlowGraph, state: ProgramState, recording: bool) -> ProgramState | None:
+    def run(self, graph: Graph, state: State, recording: bool) -> State | None:
         """The state after a routine; None where it does not come back."""
         before, self.recording = self.recording, recording
-        ends: list[ProgramState] = []
+        ends: list[State] = []
         try:
             if graph.is_structured:
                 self._region(graph, 0, len(graph.blocks), state, ends)
@@ -59,7 +76,7 @@ class RoutineRunner:
             self.recording = before
         return _joined(ends, graph.meetings[-1])
 
-    def _after(self, graph: FlowGraph, at: int, state: ProgramState) -> Led:
+    def _after(self, graph: Graph, at: int, state: State) -> list[tuple[int, State]]:
         """Runs a block with ``state``, which is not kept; a long one that ran with the same is not run again."""
         if self.recording or len(graph.blocks[at].steps) < LONG:
             return self._run_block(graph, at, state)
@@ -74,13 +91,11 @@ class RoutineRunner:
         del runs[:-KEPT]
         return led
 
-    def _region(
-        self, graph: FlowGraph, first: int, stop: int, state: ProgramState, ends: list[ProgramState]
-    ) -> ProgramState | None:
+    def _region(self, graph: Graph, first: int, stop: int, state: State, ends: list[State]) -> State | None:
         """Runs the blocks from ``first`` to before ``stop``, of which none goes back but loops; the state with which
         they are left for others, None where they never are.  ends: the states with which the routine is left."""
         starts = {first: state}
-        leaving: list[ProgramState] = []
+        leaving: list[State] = []
         at = first
         while at < stop:
             here = starts.pop(at, None)
@@ -108,9 +123,7 @@ class RoutineRunner:
                     leaving.append(after.copy())
         return _joined(leaving, graph.meetings[first, stop])
 
-    def _loop(
-        self, graph: FlowGraph, head: int, after: int, state: ProgramState, ends: list[ProgramState]
-    ) -> ProgramState | None:
+    def _loop(self, graph: Graph, head: int, after: int, state: State, ends: list[State]) -> State | None:
         """The state after a loop with its condition in the block ``head``; None where it is not left so."""
         if self._deep >= DEEPEST:
             return self._repeated(graph, head, after, state, ends)
@@ -120,9 +133,7 @@ class RoutineRunner:
         finally:
             self._deep -= 1
 
-    def _passes(
-        self, graph: FlowGraph, head: int, after: int, state: ProgramState, ends: list[ProgramState]
-    ) -> ProgramState | None:
+    def _passes(self, graph: Graph, head: int, after: int, state: State, ends: list[State]) -> State | None:
         """As ``_loop``, pass by pass as long as the condition is a constant."""
         while True:
             if self._left < 0:
@@ -139,8 +150,8 @@ class RoutineRunner:
             state = back
 
     def _until_stable(
-        self, graph: FlowGraph, head: int, after: int, state: ProgramState, ends: list[ProgramState]
-    ) -> ProgramState | None:
+        self, graph: Graph, head: int, after: int, state: State, ends: list[State]
+    ) -> State | None:
         """As ``_loop``, where it is not known how often it runs."""
         if self._unknown >= NESTED or self._left < 0:
             return self._repeated(graph, head, after, state, ends)
@@ -149,7 +160,7 @@ class RoutineRunner:
         try:
             self.recording = False
             while True:
-                found: list[ProgramState] = []
+                found: list[State] = []
                 inside, end = self._entered(graph, head, after, state)
                 back = None if inside is None else self._region(graph, head + 1, after, inside, found)
                 if back is None or not state.join(back, graph.meetings[head]):
@@ -167,25 +178,26 @@ class RoutineRunner:
         return end
 
     def _entered(
-        self, graph: FlowGraph, head: int, after: int, state: ProgramState
-    ) -> tuple[ProgramState | None, ProgramState | None]:
+        self, graph: Graph, head: int, after: int, state: State
+    ) -> tuple[State | None, State | None]:
         """The states in which a loop is entered, and left, after its condition."""
         led = dict(self._after(graph, head, state.copy()))
         inside = led.get(head + 1)
         end = led.get(after)
         return (None if inside is None else inside.copy()), (None if end is None else end.copy())
 
-    def _repeated(
-        self, graph: FlowGraph, first: int, stop: int, state: ProgramState, ends: list[ProgramState]
-    ) -> ProgramState | None:
+    def _repeated(self, graph: Graph, first: int, stop: int, state: State, ends: list[State]) -> State | None:
         """As ``_region``, of blocks that go back in any way: each with what holds on all paths that lead to it."""
         before, self.recording = self.recording, False
         starts, pending, waiting = {first: state.copy()}, [first], {first}
+        outside: dict[int, list[tuple[int, State]]] = {}
         while pending:
             at = heappop(pending)
             waiting.remove(at)
+            outside[at] = []
             for there, after in self._after(graph, at, starts[at].copy()):
                 if not first <= there < stop:
+                    outside[at].append((there, after))
                     continue
                 if there not in starts:
                     starts[there] = after.copy()
@@ -195,9 +207,10 @@ class RoutineRunner:
                     waiting.add(there)
                     heappush(pending, there)
         self.recording = before
-        leaving: list[ProgramState] = []
+        leaving: list[State] = []
         for at in sorted(starts):
-            for there, after in self._after(graph, at, starts[at].copy()):
+            led = self._after(graph, at, starts[at].copy()) if before else outside[at]
+            for there, after in led:
                 if there == -1:
                     ends.append(after.copy())
                 elif there >= 0 and not first <= there < stop:
@@ -205,7 +218,7 @@ class RoutineRunner:
         return _joined(leaving, graph.meetings[first, stop])
 
 
-def _joined(states: list[ProgramState], meeting: Meeting) -> ProgramState | None:
+def _joined(states: list[State], meeting: Meeting) -> State | None:
     """What holds in all of them, which meet at ``meeting``; None of none."""
     if not states:
         return None
