@@ -58,8 +58,9 @@ def held_out(fitted: Fit, folds: int, progress: Progress = nothing) -> Floats:
             rows = fold == k
             weights = fitted.weights.times((~rows).astype(float))
             point = descended(
-                campaign, fitted.point, fitted.unknowns, weights, True, factor=fitted.factor, close=NEAR
-            )
+                campaign, fitted.point, fitted.unknowns, weights, True, factor=fitted.factor, close=NEAR,
+                second_order=False,
+            )  # fmt: skip
             residuals[rows] = campaign.in_base(point.residual, point.nuisances)[rows, :3]
             progress(k + 1, folds)
     residuals[~counted(fitted)] = np.nan
