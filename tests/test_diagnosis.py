@@ -489,7 +489,7 @@ def test_half_an_explanation_names_nobody(monkeypatch):
 
     def diagnosed(*squares):
         left = iter(squares)
-        monkeypatch.setattr(diagnosis, "_squares", lambda fit, weights: next(left))
+        monkeypatch.setattr(diagnosis, "weighted_squares", lambda fit, weights: next(left))
         return diagnosis.diagnose(campaign, plain)
 
     monkeypatch.setattr(diagnosis, "search", with_another)
@@ -519,7 +519,7 @@ def test_many_columns_of_few_readings_are_no_sides(monkeypatch):
         Campaign(replace(campaign.readings, direction=np.repeat(rng.choice([-1.0, 1.0], (8, 6)), 3, axis=0)))
         for _ in range(10)
     ]
-    tried = sum(approach_sides._may_explain(one, done) for one in sides)
+    tried = sum(approach_sides.may_explain(one, done) for one in sides)
     monkeypatch.setattr(approach_sides, "WORTH_TRYING", -10.0)
-    assert all(approach_sides._may_explain(one, done) for one in sides)
+    assert all(approach_sides.may_explain(one, done) for one in sides)
     assert tried <= 5

@@ -97,6 +97,7 @@ def repeated(path: Toolpath, times: int) -> Toolpath:
         name: np.empty(0)
         for name in (
             "approximation",
+            "approximation_number",
             "continues",
             "drills",
             "external",

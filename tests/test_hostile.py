@@ -449,6 +449,7 @@ ALLOWED = {
     ("batching/cluster.py", "distributed"),
     ("__init__.py", "import_module"),
     ("report/result.py", "import_module"),
+    ("process/stock/borrowed.py", "import_module"),
     ("process/stock/compiled.py", "import_module"),
     ("base/memory.py", "ctypes"),
     ("base/array_memory.py", "ctypes"),

@@ -27,7 +27,7 @@ from postproc.base.array_storage import ArrayStore, GrowingColumns
 from postproc.base.findings import Refusal
 from postproc.base.sized_bytes import SizedBytes
 from postproc.languages.core import plan_rows
-from postproc.languages.krl import dependent_targets, inserting, motion_table, writer
+from postproc.languages.krl import dependent_targets, inserting, motion_table
 from postproc.languages.rapid import module_toolpath
 
 SAMPLES = Path(__file__).parents[1] / "samples"
@@ -36,7 +36,7 @@ PROGRAMS = (
     "m900ib_pocket/pocket.ls",
     "kr270_pocket/pocket.ngc",
 )
-LANGUAGE_BLOCKS = plan_rows, dependent_targets, inserting, motion_table, writer, module_toolpath
+LANGUAGE_BLOCKS = plan_rows, dependent_targets, inserting, motion_table, module_toolpath
 """Modules that work on ``BLOCK`` motions at a time."""
 ALONE = "POSTPROC_TEST_ALONE"
 FILES = "postproc_files"

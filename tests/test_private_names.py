@@ -17,11 +17,14 @@ WITHOUT_PUBLIC_NAME = {
     ("test_krl_aggregates.py", "there._replace"),
     ("test_paged_memory.py", "_core"),
     ("array_memory.py", "_core"),
+    ("borrowed.py", "view._getvalue"),
+    *(("stream.py", name) for name in ("_pytest", "item._fixtureinfo", "item._initrequest")),
     ("array_memory.py", "_ARRAY_API"),
 }
 """Python parses a regular expression in modules that have no other names since version 3.11; notebooks ask
 for a card by this name; so does a namedtuple call its copy; numpy's functions for extensions are in a table of this
-name, and which handler an array has is asked for beside it."""
+name, and which handler an array has is asked for beside it; so are what numba makes of an array in compiled code, and
+pytest's own way to run one test."""
 BY_NAME = {"getattr", "hasattr", "setattr", "delattr"}
 """Functions and methods (``monkeypatch.setattr``) that take the name of an attribute as a text."""
 

@@ -54,7 +54,7 @@ def diagnose_sides(
     if done.verdict.word in SOUND and not done.verdict.conditional:
         return done, ()
     stage("trying sides of approach")
-    if _may_explain(campaign, done):
+    if may_explain(campaign, done):
         other = diagnose(campaign, model, goes_on=by_approach)
         if _is_better(other, done):
             return other, (_finding(readings.where(0)[0], "they are taken from the order of the rows"),)
@@ -66,7 +66,7 @@ def diagnose_sides(
         direction = np.zeros_like(readings.q)
         direction[:, joint] = sides
         sided = Campaign(replace(readings, direction=direction), campaign.stated_tool)
-        if not _may_explain(sided, done):
+        if not may_explain(sided, done):
             continue
         tried = diagnose(sided, model, goes_on=lambda found: False)
         if tried.verdict.word in (*SOUND, "ambiguous") and _is_better(tried, done):
@@ -81,7 +81,7 @@ def by_approach(found: Search) -> bool:
     return any(candidate.effect.by_direction for candidate in found.chosen)
 
 
-def _may_explain(campaign: Campaign, done: Diagnosis) -> bool:
+def may_explain(campaign: Campaign, done: Diagnosis) -> bool:
     """Whether all effects of the sides of approach of ``campaign`` together, beside what was chosen without them,
     explain enough of the residual for a diagnosis of its own."""
     if by_approach(done.search):

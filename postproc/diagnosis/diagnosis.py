@@ -128,7 +128,7 @@ def diagnose(
             final = base
         elif differ:
             clear, bare = (without_effects(campaign, final, gone) for gone in (differ, names))
-            left = [_squares(one, stated.plain_weights) for one in (clear, bare, stated)]
+            left = [weighted_squares(one, stated.plain_weights) for one in (clear, bare, stated)]
             final, clear_is_better = clear, left[0] < left[2]
             if left[0] > left[1]:
                 # half of an explanation, which makes the readings worse by itself
@@ -158,7 +158,7 @@ def _banned(rejected: Sequence[tuple[Candidate, str]]) -> list[Key]:
     return keys + [(candidate.key[0], EVERY) for candidate, why in rejected if why == AS_WELL]
 
 
-def _squares(fitted: Fit, weights: Weighting) -> float:
+def weighted_squares(fitted: Fit, weights: Weighting) -> float:
     """The squares that remain after a fit."""
     residual = weights(np.nan_to_num(fitted.point.residual))
     return float(residual @ residual)

@@ -212,6 +212,7 @@ class FeedTurns:
         return np.asarray(np.clip((high - low) / (0.5 * np.pi), 0.0, 1.0))
 
     def sigma_at(self, rows: Ints, share: Floats, radius: Floats) -> Floats:
-        """(K,) 0..1 standard deviation of that, as it is not known from where on the force feels a turn."""
+        """(K,) 0..1 standard deviation of ``at`` the shares (K,) of motions ``rows`` (K,) with a cutter of ``radius``
+        (K,) [m], as it is not known from where on the force feels a turn."""
         less, more = (self.at(rows, share, reach * radius) for reach in _REACH)
         return 0.5 * (more - less)

@@ -28,7 +28,7 @@ class EditConstraints(MotionColumns):
     outside and only the position can be corrected.
     ``inserted_approximation`` (N,) [m]: of points that are inserted into a motion that ends exactly; NaN where it is
     not known.
-    ``inserted_number``: the number that these state in the place of a distance (CNT), NaN where they state none.
+    ``inserted_number``: the number that these state in the place of a distance (CNT), None where they state none.
     ``exact_stays``: what is inserted before an end point that is passed exactly is passed exactly as well (G61);
     without, it is approximated.
     ``ptp_may_change_configuration``: a point-to-point motion may lead into another configuration of the robot;
@@ -43,6 +43,6 @@ class EditConstraints(MotionColumns):
         default_factory=not_given, metadata=column(dtype=np.bool_, default=True)
     )
     inserted_approximation: Floats = field(default_factory=not_given, metadata=column(default=np.nan))
-    inserted_number: float = np.nan
+    inserted_number: float | None = None
     exact_stays: bool = False
     ptp_may_change_configuration: bool = True

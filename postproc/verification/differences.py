@@ -303,7 +303,10 @@ def _same_approximation(
     # where a control may stop or not, the distance is not known at the last part of a motion alone
     same |= np.isnan(distance) & np.isnan(number) & np.isnan(other) & np.isfinite(own)
     named = np.isfinite(own) & np.isnan(other) | np.isnan(own) & np.isnan(inserted)
-    same |= stops(one)[rows] & named & _equal(np.full(len(rows), limits.inserted_number), other)
+    if limits.inserted_number is not None:
+        same |= stops(one)[rows] & named & (other == limits.inserted_number)
+    else:
+        same |= stops(one)[rows] & named & np.isnan(other)
     return np.asarray(same | stops(two)[run_rows])
 
 

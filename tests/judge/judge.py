@@ -120,14 +120,14 @@ def judge(
     if len(cuts) != len(others):
         raise NotComparable(f"{len(cuts)} cuts before, {len(others)} after")
     largest = max((np.linalg.norm(m.force[0][:3]) for m in first.motions if not m.air), default=0.0)
-    correct = _correction(first) if rule == STRETCHED else None
+    correct = correction_along(first) if rule == STRETCHED else None
     fields = [Field(first, low, high, cell.ramp, largest, rule, correct) for low, high in cuts]
     before = _run(first, cuts, first, cuts, fields, step)
     after = _run(first, cuts, second, others, fields, step)
     return Verdict(before, after, cell, len(cuts), (len(first.motions), len(second.motions)))
 
 
-def _correction(path: Path) -> Callable[[int, np.ndarray], np.ndarray]:
+def correction_along(path: Path) -> Callable[[int, np.ndarray], np.ndarray]:
     """By how much (3,) [m] the target has to be moved where a motion begins, so that the tool is there under a wrench
     (6,) in base axes; as far as the text can state it, the tool's orientation is kept too."""
     labels, joints = path.joints_at_nodes()

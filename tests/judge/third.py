@@ -24,7 +24,7 @@ import numpy as np
 
 from .cell import Cell
 from .force import RULE, STRETCHED, Field
-from .judge import _correction, cuts_of
+from .judge import correction_along, cuts_of
 from .motion import MM
 from .path import Path
 from .reader import read
@@ -182,7 +182,7 @@ def third(original: File, output: File, cell_file: File) -> tuple[float, int, li
     robot = Robot.find(cell.robot, cell.folder)
     first, second = (Path(read(file, cell), robot, cell) for file in (original, output))
     largest = max((np.linalg.norm(m.force[0][:3]) for m in first.motions if not m.air), default=0.0)
-    correct = _correction(first) if RULE == STRETCHED else None
+    correct = correction_along(first) if RULE == STRETCHED else None
     nodes, every, worst, line = second.joints_at_nodes(), [], 0.0, 0
     for cut, rows in zip(cuts_of(first.motions), cuts_of(second.motions), strict=True):
         force = Field(first, *cut, cell.ramp, largest, RULE, correct)

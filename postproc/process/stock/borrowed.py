@@ -32,7 +32,8 @@ def _typed(context: Any, array: Any) -> tuple[Any, Any]:
 
 @compiled
 def keep_alive(array: Floats) -> int:
-    """Called after the last use of what is ``borrowed`` from an array of the same function: until here it exists."""
+    """Called after the last use of what is ``borrowed`` from an ``array`` (K, ...) of the same function: until here it
+    exists."""
     return len(array)
 
 

@@ -48,8 +48,8 @@ class Stock(NamedTuple):
     blank: see ``Blank``; sweeps (M, ROW), cutters (T, 6): see ``distance``; grid (5,): size [m] of the cells, how far
     distances are known [m], and the numbers of cells from the blank's lowest corner; first (C + 1,) and near
     (E,): the sweeps that come that near to each cell, ascending; stop (E,): the last of the sweeps from that of
-    ``near`` on that go on in one line and are near.  bounds (M, BOUND_COLUMNS): of the sweeps, see ``bounds``, or of
-    none (0, BOUND_COLUMNS); whoever changes a sweep sets its bound again.
+    ``near`` on that go on in one line and are near.  bounds (M, B): of the sweeps, B columns, or of
+    none; whoever changes a sweep sets its bound again.
     """
 
     blank: Blank

@@ -228,7 +228,7 @@ CODES = define(
             meaning="The coefficients are those of no material, or force or power are beyond any robot.",
             consequence="The correction is wrong by as much.",
             action="State ktc, krc, kac in N/mm2 and kte, kre, kae in N/mm.",
-            example="`kte: 27700` in N/m, where 27.7 N/mm is meant.",
+            example="`kte: 27700`: that is 27.7 N/mm in N/m.",
         ),
     }
 )

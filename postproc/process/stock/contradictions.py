@@ -49,7 +49,7 @@ _RATIOS = {
 }
 
 
-class _Cut(NamedTuple):
+class _StatedCut(NamedTuple):
     """What of a program a tool cuts: its rows (K,), the largest axial depth where it is wide and anywhere [m], the line
     of each, largest force [N] and power [W]."""
 
@@ -104,12 +104,12 @@ def contradictions(
     return findings
 
 
-def _cut_of(cutter: Cutter, rows: Ints, cut: EngagedMotions, toolpath: Toolpath) -> _Cut:
+def _cut_of(cutter: Cutter, rows: Ints, cut: EngagedMotions, toolpath: Toolpath) -> _StatedCut:
     depth, width = cut.depth[rows], cut.width[rows]
     wide = np.where(width >= _WIDE * 2 * cutter.radius, depth, 0.0)
     at, slot = int(np.argmax(depth)), int(np.argmax(wide))
     size = np.linalg.norm(cut.largest[rows, :3], axis=1)
-    return _Cut(
+    return _StatedCut(
         rows,
         (float(wide[slot]), int(toolpath.line[rows[slot]])),
         (float(depth[at]), int(toolpath.line[rows[at]])),
@@ -119,7 +119,7 @@ def _cut_of(cutter: Cutter, rows: Ints, cut: EngagedMotions, toolpath: Toolpath)
 
 
 def _sizes(
-    cutter: Cutter, found: _Cut, of_cell: float | None, tip: float | None
+    cutter: Cutter, found: _StatedCut, of_cell: float | None, tip: float | None
 ) -> Iterator[tuple[str, str]]:
     """Message and help of each contradiction to the cell, and of the cut to the diameter."""
     wide = 2 * cutter.radius
@@ -231,7 +231,7 @@ def _ridges(
     yield message, "is the diameter a radius, or in another unit than mm?"
 
 
-def _forces(cutter: Cutter, found: _Cut, process: StockProcess) -> Iterator[tuple[str, str]]:
+def _forces(cutter: Cutter, found: _StatedCut, process: StockProcess) -> Iterator[tuple[str, str]]:
     material = process.edges[cutter.number].material
     name = f"tool {cutter.number}"
     if material is not None:
