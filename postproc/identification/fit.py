@@ -158,13 +158,17 @@ def fit(
     steps, close, last = NEAR_STEPS if near else MAX_STEPS, NEAR, near or not exact
     free, dropped = list(unknowns), list[Dropped]()
     again = PRIOR_ROUNDS if any(u.prior is not None for u in unknowns) else 0
+    sought = factor
     while True:
-        point = descended(campaign, point, free, plain, near, steps, factor, close)
+        # the last round finds the same minimum more exactly: weights or a variance estimated anew would move it
+        exactly = close != NEAR
+        sought = sought if exactly else factor
+        point = descended(campaign, point, free, plain, near, steps, sought, close)
         updated = _with_turns(campaign, point, noise, plain)
         together = np.concatenate(point.required_columns, axis=2)
         updated = replace(updated, shared=shared_error(point.residual, updated, together, noise.known))
-        if updated.shared != plain.shared or updated.weight is not plain.weight:
-            plain, point = updated, descended(campaign, point, free, updated, near, steps, factor, close)
+        if not exactly and (updated.shared != plain.shared or updated.weight is not plain.weight):
+            plain, point = updated, descended(campaign, point, free, updated, near, steps, sought, close)
         weights = plain
         if robust:
             point, weights = _robust(campaign, point, free, plain, rows, factor, noise.known)
@@ -174,7 +178,7 @@ def fit(
         factor, exceeded, freedom, quantile = _variance(
             campaign, point, free, weights, plain, noise, analysis
         )
-        if again and abs(np.log(factor / before)) > SAME_FACTOR:
+        if again and not exactly and abs(np.log(factor / before)) > SAME_FACTOR:
             again -= 1
             continue
         analysis = _insight(campaign, point, free, weights, factor)

@@ -95,7 +95,7 @@ def matrix(records: Records) -> list[str]:
         ("pairs, right, SNR >= 2", at(["pair"], 2.0), is_right),
         ("triples, right, SNR >= 2", at(["triple"], 2.0), is_right),
         ("wrong name, SNR >= 2", at(["single", "decoy", "pair", "triple"], 2.0), is_wrong),
-        ("outside: told unknown, SNR >= 2", at(["outside"], 2.0), is_right),
+        ("outside: unknown, SNR >= 2", at(["outside"], 2.0), is_right),
         ("outside: misnamed, SNR >= 2", at(["outside"], 2.0), is_named),
         ("outside: given a name, SNR <= 1", at(["outside"], 0.0, 1.0), is_named),
         ("unidentifiable: ambiguous, or nothing claimed", by["unidentifiable"], is_right),
