@@ -416,6 +416,20 @@ def test_nothing_more_can_be_taken_off_at_the_solution():
     assert found.factor * found.freedom == pytest.approx(left @ left, rel=1e-4)
 
 
+def test_an_exact_fit_ends_where_the_rough_one_does():
+    """Nothing explains readings that are a thousand scatters off: their variance weighs the scale of a tracker no more
+    in the round that makes the fit exact."""
+    rng = np.random.default_rng(26)
+    readings, model, term, values = hidden("joint_offset", "tracker", rng)
+    readings = scattered(read(put_to(model, term, values), readings, rng), 1000 * SIGMA, rng)
+    campaign = Campaign(replace(readings, sigma=np.full(len(readings), SIGMA)))
+    rough, found = (fit(campaign, model, (), exact=exact) for exact in (False, True))
+    assert found.factor > 1e4
+    assert found.point.nuisances.scale == pytest.approx(rough.point.nuisances.scale, abs=1e-8)
+    left, least = (one.weights(one.point.residual) for one in (found, rough))
+    assert left @ left == pytest.approx(least @ least, rel=1e-6)
+
+
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("size", [1.0, 0.05])
 @pytest.mark.parametrize("known", [True, False])
