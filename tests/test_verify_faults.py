@@ -1,11 +1,15 @@
 """Faults planted in written programs: ``verify`` rejects every one of them (see ``planted_faults``)."""
 
+import re
+import shutil
+
 import pytest
 from judge.cases import CASES, FIVE_AXIS, gcode, straight
 from judge.drawn import drawn
 from judge.further_cases import FURTHER
-from planted_faults import SAMPLES, Written
+from planted_faults import ROOT, SAMPLES, Written
 
+import postproc
 from postproc.base.findings import Refusal
 from postproc.workflows.preparation import Request
 from postproc.workflows.program import compensate
@@ -163,3 +167,28 @@ def test_a_feed_that_no_machine_has_is_refused(tmp_path):
         compensate(Request(program, force=""))
     assert [one.code for one in refused.value.findings] == ["FIL015"]
     assert not (tmp_path / "compensated").exists()
+
+
+def test_the_number_of_a_point_that_is_inserted_into_a_motion_that_stops(tmp_path):
+    """Arcs of Fanuc TP that end with FINE: the points within them flow with CNT100, and with no other number."""
+    for name in ("cell.yaml", "arm.yaml", "pocket.ls"):
+        shutil.copy(ROOT / "samples" / "m900ib_pocket" / name, tmp_path / name)
+    program = tmp_path / "pocket.ls"
+    text = re.sub(r"(:  P\[\d+\] 50mm/sec) CNT100", r"\1 FINE", program.read_bytes().decode("latin-1"))
+    program.write_bytes(text.encode("latin-1"))
+    postproc.compensate(program, force=True)
+    written = tmp_path / "compensated" / "pocket.ls"
+    clean = written.read_bytes()
+    rows = [
+        i for i, line in enumerate(clean.split(b"\n")) if re.search(rb":C P\[\d+\] P\[\d+\] .*CNT100", line)
+    ]
+    assert len(rows) > 3
+
+    def codes():
+        return {one.code for one in postproc.verify(program, written, force=True).findings}
+
+    assert "VER005" not in codes()
+    lines = clean.split(b"\n")
+    lines[rows[1]] = lines[rows[1]].replace(b"CNT100", b"CNT40")
+    written.write_bytes(b"\n".join(lines))
+    assert "VER005" in codes()
