@@ -9,6 +9,11 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from postproc.base.byte_search import matches
+
+LONGEST = 1000
+"""Bytes of a statement, at most."""
+
 _NUMBER = rb"[-+]?[0-9.]++(?:E[-+]?[0-9]++)?"
 _STATED = re.compile(
     rb"\$(?:APO|ORI_APO|APO_[A-Z_]++)\b[^\r\n;=]{0,80}=[^\r\n;]{1,200}"  # KRL
@@ -20,6 +25,8 @@ _STATED = re.compile(
     rb"|(?<![A-Z0-9_.])CYCLE832[ \t]*+\([^)\r\n]{0,200}\)",
     re.IGNORECASE,
 )  # fmt: skip
+_WORDS = (b"APO", b"ZONEDATA", b"G6", b"ADIS", b"CTOL", b"OTOL", b"CYCLE832")
+"""One of which is in all that is looked for."""
 
 
 def approximation_words(texts: Sequence[bytes]) -> list[tuple[bytes, int]]:
@@ -27,7 +34,7 @@ def approximation_words(texts: Sequence[bytes]) -> list[tuple[bytes, int]]:
     found = []
     for text in texts:
         line, last = 1, 0
-        for one in _STATED.finditer(text):
+        for one in matches(_STATED, text, _WORDS, LONGEST):
             line, last = line + text.count(b"\n", last, one.start()), one.start()
             found.append((b"".join(one[0].split()).upper(), line))
     return found

@@ -185,6 +185,27 @@ class RunPath:
             angle[some] = np.arccos(np.clip(np.sum(one * two, axis=1), -1.0, 1.0))
         return angle
 
+    def departure(self, rows: Ints) -> tuple[Floats, Floats]:
+        """(R,) [m] and (R,) [rad] by how much position and orientation depart, in the middle of the parabolas where the
+        motions ``rows`` (R,) start, from the polygon: a quarter of d times by how much the direction of the path, and
+        the turn of the tool per length, change there."""
+        path, off, turn = self.task.desired_path, np.zeros(len(rows)), np.zeros(len(rows))
+        some = np.flatnonzero(self.reach[rows] > 0)
+        at = rows[some]
+        quarter = 0.25 * self.reach[at]
+        one, two = path.tangent(at - 1, np.ones(len(at))), path.tangent(at, np.zeros(len(at)))
+        off[some] = quarter * lengths(two - one)
+        turns = (path.angle[at] > _NO_TURN) | (path.angle[at - 1] > _NO_TURN)
+        one, two = (self._turn_rate(each[turns]) for each in (at - 1, at))
+        turn[some[turns]] = quarter[turns] * lengths(two - one)
+        return off, turn
+
+    def _turn_rate(self, rows: Ints) -> Floats:
+        """(R, 3) [rad/m] turn of the tool per length of the motions ``rows`` (R,)."""
+        path = self.task.desired_path
+        turn = turn_between(path.start[rows].rotation, path.end[rows].rotation)
+        return np.asarray(turn / np.maximum(path.length[rows], _NO_LENGTH)[:, None])
+
     def _near(self, rows: Ints, share: Floats) -> Iterator[tuple[Ints, Ints, Floats]]:
         """Which of ``rows`` (K,) at the shares (K,) are on the parabola where they start, and then which on the one
         where they end: their numbers, the motions that start at those vertices, and u."""

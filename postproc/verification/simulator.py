@@ -30,6 +30,10 @@ STILL, STILL_SHARE = 2e-7, 0.02
 DOUBLINGS, MOST = 6, 4_000_000
 """How often the samples are doubled at most, and how many they may become."""
 
+SHOWS, SHOWS_TURN = 8e-7, 8e-6
+"""[m], [rad] by which a parabola departs at least from the polygon, where its halves have samples of their own.  Its
+middle and its ends have samples anyhow; from the line between these it departs by a quarter of it: ``STILL``."""
+
 BESIDE = 2 * STEP
 """[m] How far before and after the place of a point the path of the tool is looked at for the way past it."""
 
@@ -220,7 +224,7 @@ class Simulator:
         """Samples so dense that twice as many change nothing, and what the last doubling changed."""
         stretch, rows = np.repeat(np.arange(len(start)), stop - start), _rows(start, stop)
         parts = np.maximum(LEAST, np.ceil(run.desired_path.length[rows] / step)).astype(np.int64)
-        halves = np.ones(len(rows), np.int64)
+        halves = self._rounded(path, rows)
         samples = self._sampled(run, path, stretch, rows, parts, halves)
         change = change_angle = float("nan")
         for _ in range(DOUBLINGS):
@@ -249,6 +253,17 @@ class Simulator:
             change_angle = abs(float(finer.place.turn.max() - samples.place.turn.max()))
             samples = finer
         return samples, change, change_angle
+
+    @staticmethod
+    def _rounded(path: RunPath, rows: Ints) -> Ints:
+        """(R,) 1 for motions ``rows`` (R,) on which a parabola shows: elsewhere the path is as good as its polygon."""
+        count = len(path.reach)
+        vertices = np.union1d(rows, rows + 1)
+        vertices = vertices[vertices < count]
+        off, turn = path.departure(vertices)
+        shows = np.zeros(count + 1, bool)
+        shows[vertices] = (off > SHOWS) | (turn > SHOWS_TURN)
+        return (shows[rows] | shows[rows + 1]).astype(np.int64)
 
     def _sampled(
         self,
