@@ -103,8 +103,10 @@ def _against_feed(
     path = run.wanted[row].position - run.desired_path.start[row].position
     back = ~run.desired_path.arc[row]
     for at in (motions.start, motions.middle, motions.end):
-        feed = simulator.path.tangent(samples.place.row[at], samples.place.share[at])
-        back &= np.sum(path * feed, axis=1) < -AGAINST
+        asked = np.flatnonzero(back)
+        place = at[asked]
+        feed = simulator.path.tangent(samples.place.row[place], samples.place.share[place])
+        back[asked] = np.sum(path[asked] * feed, axis=1) < -AGAINST
     return np.asarray(back)
 
 

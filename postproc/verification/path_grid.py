@@ -23,6 +23,10 @@ LEAST_NODES = 2
 TURN = np.radians(15.0)
 """By how much the path turns from one node to the next, at most."""
 
+RESIDUAL, NEARLY = 1e-7, 1e-6
+"""[m] How far along the path a tool may be from the place whose force it has; and where the displacement hardly changes
+on the way there: what the tool is ahead is taken off its error then, as the last step along the path would."""
+
 SPOT = 1e-6
 """[m] A motion that is not longer only turns the tool."""
 
@@ -85,6 +89,18 @@ class PathGrid:
         spot = np.zeros(len(self.original.toolpath), bool)
         spot[self.row] = self.original.desired_path.length[self.row] < SPOT
         return spot
+
+    @cached_property
+    def near(self) -> Floats:
+        """(J,) [m] how far along the path from its place a tool may be found, in the interval after each node: so far
+        that the displacement changes by ``RESIDUAL`` on the way, from that to ``NEARLY``.  Within a vertex it may
+        change without any."""
+        moved, step = np.diff(self.goal_at - self.v, axis=0), np.diff(self.arc)
+        near = np.full(len(self.arc), RESIDUAL)
+        some = np.flatnonzero(~self.gap[:-1])
+        rate = lengths(moved[some]) / np.maximum(step[some], SPOT)
+        near[some] = np.clip(RESIDUAL / np.maximum(rate, RESIDUAL), RESIDUAL, NEARLY)
+        return near
 
     def place(self, interval: Ints, part: Floats) -> tuple[Ints, Floats]:
         """Row (S,) and share (S,) at the parts (S,) of intervals (S,); of a vertex the end of the motion before it."""

@@ -31,12 +31,9 @@ from postproc.base.geometry import Poses, lengths, turn_between
 from postproc.base.units import MM
 from postproc.compensation.mirror import Prediction
 from postproc.compensation.problem import CompensationProblem
-from postproc.verification.path_grid import LEAST_NODES, SPOT, PathGrid
+from postproc.verification.path_grid import LEAST_NODES, RESIDUAL, SPOT, PathGrid
 from postproc.verification.run_path import RunPath
 from postproc.verification.tracking import track_commands
-
-RESIDUAL = 1e-7
-"""[m] How far along the path a tool may be from the place whose force it has."""
 
 STEPS, HALVINGS = 10, 60
 """Newton's steps at most, and steps of bracketing of what they do not settle."""
@@ -204,6 +201,7 @@ class _Solution:
         count = len(motion)
         self.error, self.turn, self.tool = np.full((3, count, 3), np.nan)
         self.force, self.settled = np.full(count, np.nan), np.zeros(count, bool)
+        self.step = np.zeros(count)
         self.q: Floats | None = None
         self.displacement = np.zeros((0, 0))
 
@@ -212,13 +210,11 @@ class _Solution:
         self.interval, self.part = interval.copy(), part.copy()
         active = np.arange(len(interval))
         for _ in range(STEPS):
-            ahead = self._ahead(active)
-            active, ahead = active[~self.settled[active]], ahead[~self.settled[active]]
-            some = np.isfinite(ahead)
-            active, ahead = active[some], ahead[some]
+            some = np.isfinite(self._ahead(active)) & ~self.settled[active]
+            active = active[some]
             if not len(active):
                 return
-            self._step(active, ahead)
+            self._step(active)
         self._bracket(active, interval[active])
 
     def find_beside(self, place: Floats) -> None:
@@ -293,26 +289,36 @@ class _Solution:
         ahead = np.where(good, np.sum(error * tangent, axis=1), np.nan)
         at_end = (self.interval[active] == self.high[active]) & (self.part[active] >= 1) & (ahead > 0)
         at_start = (self.interval[active] == self.low[active]) & (self.part[active] <= 0) & (ahead < 0)
+        interval, part = self.interval[active], self.part[active]
+        step = ahead / self._slope(active)
+        near = np.abs(step) * np.diff(self.grid.arc)[interval] <= self.grid.near[interval]
+        near = np.where(self.grid.gap[interval], False, near & (part + step >= 0) & (part + step <= 1))
+        self.settled[active] = done = good & (near | (np.abs(ahead) <= RESIDUAL) | at_end | at_start)
+        self.part[active] = np.where(near, part + step, part)
+        error -= np.where(near, ahead, 0.0)[:, None] * tangent
         self.error[active], self.tool[active] = error, real.pose.position
         self.force[active] = lengths(wrench[:, :3])
-        self.settled[active] = done = good & ((np.abs(ahead) <= RESIDUAL) | at_end | at_start)
+        self.step[active] = step
         if done.all():
             self.turn[active] = turn_between(goal.rotation, real.pose.rotation)
         elif done.any():
             self.turn[active[done]] = turn_between(goal.rotation[done], real.pose.rotation[done])
         return ahead
 
-    def _step(self, active: Ints, ahead: Floats) -> None:
-        """Moves the places of ``active`` by what their tools are ``ahead`` [m] of them, no farther than into the next
-        interval."""
-        grid, interval = self.grid, self.interval[active]
-        place = self.command.position[active]
+    def _slope(self, active: Ints) -> Floats:
+        """(K,) [m] by how much less the tools of ``active`` are ahead of their places at the end of their interval than
+        at its start."""
+        grid, interval, place = self.grid, self.interval[active], self.command.position[active]
         one, two = (
             np.sum((place - grid.v[at]) * grid.tangent[at], axis=1) for at in (interval, interval + 1)
         )
-        least = FLAT * (grid.arc[interval + 1] - grid.arc[interval]) + 1e-9
-        old = self.part[active]
-        part = old + np.clip(ahead / np.maximum(one - two, least), -2.0, 2.0)
+        return np.maximum(one - two, FLAT * (grid.arc[interval + 1] - grid.arc[interval]) + 1e-9)
+
+    def _step(self, active: Ints) -> None:
+        """Moves the places of ``active`` by the steps that were found where they are, no farther than into the next
+        interval."""
+        interval, old = self.interval[active], self.part[active]
+        part = old + np.clip(self.step[active], -2.0, 2.0)
         # what leads beyond an end is not gone on with: the slope there is another one
         forth = (part > 1) & (old >= 1) & (interval < self.high[active])
         back = (part < 0) & (old <= 0) & (interval > self.low[active])
