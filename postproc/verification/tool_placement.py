@@ -312,7 +312,8 @@ class _Solution:
         one, two = (
             np.sum((place - grid.v[at]) * grid.tangent[at], axis=1) for at in (interval, interval + 1)
         )
-        return np.maximum(one - two, FLAT * (grid.arc[interval + 1] - grid.arc[interval]) + 1e-9)
+        least = FLAT * (grid.arc[interval + 1] - grid.arc[interval]) + 1e-9
+        return np.asarray(np.maximum(one - two, least))
 
     def _step(self, active: Ints) -> None:
         """Moves the places of ``active`` by the steps that were found where they are, no farther than into the next
