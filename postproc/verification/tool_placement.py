@@ -291,8 +291,9 @@ class _Solution:
         at_start = (self.interval[active] == self.low[active]) & (self.part[active] <= 0) & (ahead < 0)
         interval, part = self.interval[active], self.part[active]
         step = ahead / self._slope(active)
-        near = np.abs(step) * np.diff(self.grid.arc)[interval] <= self.grid.near[interval]
-        near = np.where(self.grid.gap[interval], False, near & (part + step >= 0) & (part + step <= 1))
+        arc = self.grid.arc[interval + 1] - self.grid.arc[interval]
+        near = (np.abs(step) * arc <= self.grid.near[interval]) & ~self.grid.gap[interval]
+        near &= (part + step >= 0) & (part + step <= 1)
         self.settled[active] = done = good & (near | (np.abs(ahead) <= RESIDUAL) | at_end | at_start)
         self.part[active] = np.where(near, part + step, part)
         error -= np.where(near, ahead, 0.0)[:, None] * tangent
