@@ -7,6 +7,7 @@ import pytest
 from path_cases import circle, corner, line, task
 from test_verify import as_run, bend, simulated
 
+from postproc.base.geometry import rotation_from_vector, turn_between
 from postproc.base.units import MM
 from postproc.process import Wrenches
 from postproc.toolpath import Configuration
@@ -147,6 +148,39 @@ def test_a_vertex_is_passed_on_the_parabola():
         np.testing.assert_allclose(
             path.tangent(np.array([row]), np.array([share]))[0], way / np.linalg.norm(way), atol=1e-9
         )
+
+
+def test_a_parabola_departs_from_its_vertex_as_said():
+    made = approximated(8 * MM)
+    rotation = made.wanted.rotation.copy()
+    for row, turned in ((2, (0.01, 0.0, 0.02)), (3, (-0.02, 0.03, 0.02))):
+        rotation[row] = rotation_from_vector(np.array([turned]))[0] @ rotation[row - 1]
+    path = RunPath.of(replace(made, wanted=replace(made.wanted, rotation=rotation)))
+    off, turn = path.departure(np.arange(5))
+    here = path.at(np.array([3]), np.array([0.0]))
+    assert off[3] == pytest.approx(np.linalg.norm(here.position[0] - [1.6, 0.0, 0.5]), abs=1e-12)
+    by = np.linalg.norm(turn_between(rotation[2:3], here.rotation))
+    assert by > 1e-4
+    assert turn[3] == pytest.approx(by, rel=0.02)
+    assert not np.delete(off, 3).any()
+    assert not np.delete(turn, 3).any()
+
+
+@pytest.mark.parametrize("distance", [0.0, 0.9 * MM])
+def test_few_samples_show_what_many_do(distance):
+    """Of motions that are shorter than the distance of the first samples, rounded and not."""
+    turns = np.radians([0.0, 20.0, 30.0, 30.0, 80.0, 80.5, 81.0])
+    points = np.cumsum(2 * MM * np.stack([np.cos(turns), np.sin(turns), 0 * turns], axis=1), axis=0)
+    points = np.array([[1.6, 0.0, 0.5], *(points + [1.6, 0.0, 0.5])])
+    made = task(points, [False] + [True] * 7)
+    blend = np.array([0.0] + [distance] * 6 + [0.0])
+    made = replace(made, toolpath=made.toolpath.with_columns(approximation=blend, stops=blend == 0.0))
+    run, pairing = replace(made), pair_motions(made, made)
+    simulator = Simulator.of(made, pairing)
+    few, many = (simulator.run(run, pairing.start, pairing.stop, step) for step in (4 * MM, 0.02 * MM))
+    assert len(few.samples.motion) < 0.2 * len(many.samples.motion)
+    assert few.largest == pytest.approx(many.largest, abs=3e-7)
+    assert few.samples.rms == pytest.approx(many.samples.rms, rel=0.02)
 
 
 def test_a_vertex_is_passed_within_half_of_its_motions():
