@@ -65,7 +65,25 @@ def lines_of(answers: Sequence[dict[str, Any]]) -> list[str]:
             share_interval(int(worse), len(done)), share_interval(kept, len(done)), refused,
         ]  # fmt: skip
         text.append("| " + " | ".join(cells) + " |")
-    return text + _place(answers) + _other(answers) + _parts(answers) + _names(answers) + _coverage(answers)
+    return text + _worse(answers) + _place(answers) + _other(answers) + _parts(answers) + _names(answers) + _coverage(answers)
+
+
+FEW = ("same20", "same30", "planned30")
+"""Rows with less than 50 points."""
+
+
+def _worse(answers: Sequence[dict[str, Any]]) -> list[str]:
+    """Parts that were worse than before, and by how much."""
+    done = [one for one in answers if "after" in one and one["row"] not in FEW]
+    if not done:
+        return []
+    worse = sorted(
+        ((one["after"] - one["before"], one) for one in done if one["after"] > one["before"]),
+        key=lambda pair: -pair[0],
+    )
+    each = ", ".join(f"{1e6 * more:.1f} ({one['row']}, {1e6 * one['before']:.1f})" for more, one in worse)
+    text = f"50 points or more: worse {len(worse)} of {len(done)}"
+    return ["", text + (f", by um (row, before): {each}" if each else "")]
 
 
 def _place(answers: Sequence[dict[str, Any]]) -> list[str]:
@@ -155,7 +173,9 @@ def _names(answers: Sequence[dict[str, Any]]) -> list[str]:
             *(str(sum(any(n.startswith(head) for n in one["named"]) for one in own)) for head in HEADS),
         ]
         text.append("| " + " | ".join(cells) + " |")
-    return text
+    hidden = [one for one in seen if one["hidden"]]
+    wrong = sum(bool(set(one["named"]) - set(one.get("labels", ()))) for one in hidden)
+    return [*text, "", f"a wrong name where something is hidden: {share_interval(wrong, len(hidden))} %"]
 
 
 def _met(answer: dict[str, Any], names: Sequence[str]) -> bool:
