@@ -359,3 +359,19 @@ def test_the_next_part_of_a_plant_is_better(tmp_path):
     with pytest.raises(postproc.Refusal) as caught:
         postproc.learn(program, program.parent / "wrong.csv")
     assert [finding.code for finding in caught.value.findings] == ["LRN004"]
+
+
+def test_a_program_that_leaves_cuts_as_they_are_is_not_written(shop):
+    """Without room for points whole cuts stay uncorrected: the next part would be worse than the measured one."""
+    cell = shop / "cell.yaml"
+    cell.write_text(cell.read_text().replace("max_growth: 8", "max_growth: 1"))
+    done = call(shop, "part.src", "part1.csv", "--json", "result.json")
+    assert done.exit_code == 3, done.output
+    result = json.loads((shop / "result.json").read_text())
+    codes = {one["code"] for one in result["findings"]}
+    assert {"COR003", "LRN021", "LRN009"} <= codes
+    assert not (shop / "learned" / "part.src").exists()
+    assert result["next_program"] is None
+    promise = result["promise"]
+    assert promise["after_rms_mm"] > promise["before_rms_mm"]
+    assert promise["lower_rms_mm"] < promise["after_rms_mm"] < promise["upper_rms_mm"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from postproc.learning.covariance import Explanation, Layout, SmoothField
-from postproc.learning.promise import held_out_variance
+from postproc.learning.promise import Promise, held_out_variance
 
 
 def explained(rng, count, free):
@@ -50,3 +50,18 @@ def test_few_points_promise_less_than_they_know_of_themselves():
         assert (beside > at_them).all()
         ratios.append(np.sqrt(beside.mean() / at_them.mean()))
     assert ratios[0] > 1.5 * ratios[1]
+
+
+def test_what_is_not_corrected_stays():
+    """9 of 12 places are corrected; an alignment along the first column takes its share of what stays out."""
+    rng = np.random.default_rng(4)
+    error, free = 1e-4 * rng.normal(size=12), rng.normal(size=(12, 1))
+    corrected = np.arange(12) >= 3
+    found = Promise(2e-4, 1e-5, 4e-6, 3e-5).with_uncorrected(error, corrected, free)
+    stays = np.append(error[:3], np.zeros(9))
+    stays = stays - free[:, 0] * (free[:, 0] @ stays) / (free[:, 0] @ free[:, 0])
+    left = np.sum(stays**2) / 12
+    assert found.after == pytest.approx(np.sqrt(0.75 * 1e-5**2 + left))
+    assert found.lower < np.sqrt(left) < found.upper
+    assert found.before == 2e-4
+    assert Promise(2e-4, 1e-5, 4e-6, 3e-5).with_uncorrected(error, corrected | True, free).after == 1e-5

@@ -80,7 +80,8 @@ def cuts_not_improved(
         return maxima
 
     def mean_square(values: Floats) -> Floats:
-        return np.bincount(place, np.nan_to_num(values) ** 2, len(cuts)) / np.bincount(place)
+        size = np.nan_to_num(values, posinf=np.inf)
+        return np.bincount(place, size**2, len(cuts)) / np.bincount(place)
 
     ends = result.across_after[rows]
     square = [mean_square(values[rows]) for values in (result.after, result.before)]

@@ -166,5 +166,13 @@ CODES = define(
             action="Look at one place of the part again and add `# checked:`, or the measured places (MX, MY, MZ).",
             example="A first part of a robot and forces that are nearly as stated.",
         ),
+        "LRN021": Code(
+            "warning",
+            "measured places are not corrected",
+            meaning="Points lie on motions that the next program leaves as they are; another finding says why.",
+            consequence="Their whole deflection stays on the next part; the promise considers it.",
+            action="Remove the cause that the other finding names, or keep the program that cut the measured part.",
+            example="A cut on which a wide gap of an axis changes its side (COR016).",
+        ),
     }
 )

@@ -22,6 +22,9 @@ from postproc.learning.covariance import SCATTER, Explanation
 HOPE, UPPER, LOWER = 1.1, 3.0, 0.38
 """Ratios: what remains to what the covariance says, and the ends of its 95 % interval."""
 
+STAYS = 0.3
+"""Half width of the 95 % interval of an error that is not corrected, as a share of it: what a force is known to."""
+
 
 @dataclass(frozen=True)
 class Promise:
@@ -37,6 +40,18 @@ class Promise:
     def better(self) -> bool:
         """Whether the next part is expected to be better by more than it may be worse."""
         return self.after < 0.9 * self.before
+
+    def with_uncorrected(self, error: Floats, corrected: Bools, free: Floats) -> Promise:
+        """The same of a program that does not correct all places (J,) of the part that was cut last: ``error`` (J,) [m]
+        of those that are not ``corrected`` (J,) stays; free (J, A): freedoms of the alignment.
+
+            after^2 = share of corrected places * after^2 + mean(stays^2)
+        """
+        stays = aligned(np.where(corrected, 0.0, error), alignment_basis(free))
+        left, share = float(np.sqrt(np.mean(stays**2))), float(np.mean(corrected))
+        ends = ((self.after, 1.0), (self.lower, 1.0 - STAYS), (self.upper, 1.0 + STAYS))
+        after, lower, upper = (float(np.hypot(np.sqrt(share) * end, by * left)) for end, by in ends)
+        return Promise(self.before, after, lower, upper)
 
 
 def promise(result: Attribution, last: Bools, gain: float = 1.0) -> Promise:

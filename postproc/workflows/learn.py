@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -31,7 +30,7 @@ from postproc.measurements import read_measurements
 from postproc.output.atomic_write import replace_file, write_atomically
 from postproc.process import Wrenches
 from postproc.report.learned import Learned, LearnedPart, learned_csv
-from postproc.report.report import exit_code, in_order_of_place, json_bytes
+from postproc.report.report import Report, exit_code, in_order_of_place, json_bytes
 from postproc.robot.description import robot_of
 from postproc.workflows.cell_tool_errors import tool_displacement
 from postproc.workflows.kinds import PART, check_kind
@@ -275,12 +274,16 @@ def _findings(
     if words:
         findings.append(Finding("LRN008", words, file))
     if not promised.better:
-        message = (
-            f"the next part would have {promised.after / MM:.3f} mm RMS where this one has"
-            f" {promised.before / MM:.3f} mm: the next program is not written"
-        )
-        findings.append(Finding("LRN009", message, file))
+        findings.append(_no_better(promised, file))
     return findings
+
+
+def _no_better(promised: Promise, file: str) -> Finding:
+    message = (
+        f"the next part would have {promised.after / MM:.3f} mm RMS where this one has"
+        f" {promised.before / MM:.3f} mm: the next program is not written"
+    )
+    return Finding("LRN009", message, file)
 
 
 def _learned_inputs(job: CutProgram, matched: Matched, result: Attribution) -> LearnedInputs:
@@ -342,15 +345,17 @@ def _published(
     following = folder / main.program.name
     if learned.promise.better:
         stage("compensating the next program")
-        with nullcontext() if request.dry_run else kept_before(following):
-            report = compensate(
-                replace(main, output=following, learned=inputs, dry_run=request.dry_run, json=None),
-                stage,
-            )
+        asked = replace(main, output=following, learned=inputs, keep_table=True, json=None)
+        report = compensate(replace(asked, dry_run=True), stage)
+        learned = _with_uncorrected(learned, report, matched, str(parts[-1].file))
+        if learned.promise.better:
+            if not request.dry_run:
+                stage("writing the next program")
+                with kept_before(following):
+                    report = compensate(asked, stage)
+            learned = replace(learned, next_program=report)
         findings = in_order_of_place([*learned.findings, *report.findings])
-        learned = replace(
-            learned, next_program=report, findings=findings, exit=exit_code(findings, request.strict)
-        )
+        learned = replace(learned, findings=findings, exit=exit_code(findings, request.strict))
     if request.dry_run:
         return learned
     outputs = () if learned.next_program is None else learned.next_program.outputs
@@ -378,6 +383,29 @@ def _published(
     write_atomically(files, last=own, still=remembered.refuse_changed)
     replace_file(remembered.path, record.as_bytes(), remembered.refuse_changed)
     return learned
+
+
+def _with_uncorrected(learned: Learned, report: Report, matched: Matched, file: str) -> Learned:
+    """What was learnt, with the promise of a next program that leaves motions as they are; ``file``: of the part that
+    was cut last."""
+    result = learned.attribution
+    own = np.flatnonzero(result.kept & (matched.file == len(learned.data) - 1))
+    row, table = matched.points.row[own], report.table()
+    uncorrected = np.isin(table["state"][row], ("uncorrected", "off"))
+    if not uncorrected.any():
+        return learned
+    moved = MM * np.column_stack([table[f"deflection_{axis}_mm"][row] for axis in "xyz"])
+    error = np.nan_to_num(np.sum(moved * (matched.points.normal[own] @ matched.axes), axis=1))
+    promised = learned.promise.with_uncorrected(error, ~uncorrected, result.layout.free[own])
+    message = (
+        f"{int(uncorrected.sum())} of {len(own)} points lie on motions that the next program does not correct;"
+        f" with them the promise were {learned.promise.after / MM:.3f} mm RMS"
+    )
+    line = int(learned.program_line[own][uncorrected].min())
+    findings = [*learned.findings, Finding("LRN021", message, learned.program, line)]
+    if not promised.better:
+        findings.append(_no_better(promised, file))
+    return replace(learned, promise=promised, findings=tuple(findings))
 
 
 def _step(learned: Learned, record: Path, kept: Path | None) -> RecordedStep:

@@ -65,7 +65,15 @@ def lines_of(answers: Sequence[dict[str, Any]]) -> list[str]:
             share_interval(int(worse), len(done)), share_interval(kept, len(done)), refused,
         ]  # fmt: skip
         text.append("| " + " | ".join(cells) + " |")
-    return text + _worse(answers) + _place(answers) + _other(answers) + _parts(answers) + _names(answers) + _coverage(answers)
+    return (
+        text
+        + _worse(answers)
+        + _place(answers)
+        + _other(answers)
+        + _parts(answers)
+        + _names(answers)
+        + _coverage(answers)
+    )
 
 
 FEW = ("same20", "same30", "planned30")
