@@ -171,7 +171,7 @@ def test_few_samples_show_what_many_do(distance):
     """Of motions that are shorter than the distance of the first samples, rounded and not."""
     turns = np.radians([0.0, 20.0, 30.0, 30.0, 80.0, 80.5, 81.0])
     points = np.cumsum(2 * MM * np.stack([np.cos(turns), np.sin(turns), 0 * turns], axis=1), axis=0)
-    points = np.concatenate([np.zeros((1, 3)), points]) + [1.6, 0.0, 0.5]
+    points = np.pad(points, ((1, 0), (0, 0))) + np.array([1.6, 0.0, 0.5])
     made = task(points, [False] + [True] * 7)
     blend = np.array([0.0] + [distance] * 6 + [0.0])
     made = replace(made, toolpath=made.toolpath.with_columns(approximation=blend, stops=blend == 0.0))
