@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.base.arrays import Bools, FewRows, Floats, Ints
+from postproc.base.batches import each_block
 from postproc.base.geometry import lengths, turn_between
 from postproc.base.units import MM
 from postproc.compensation.problem import CompensationProblem
@@ -82,12 +83,11 @@ class PathManner:
         motions = ComparedMotions.of(simulation.samples)
         inside = np.append(motions.stretch[1:] == motions.stretch[:-1], False)[: len(motions.row)]
         rests = stops(run.toolpath)[motions.row] & inside
-        turn = lengths(
-            turn_between(run.desired_path.start[motions.row].rotation, run.wanted[motions.row].rotation)
-        )
-        idle = (run.desired_path.length[motions.row] < IDLE) & (turn < IDLE_TURN)
+        short = run.desired_path.length[motions.row] < IDLE
+        row = motions.row[short]
+        turn = lengths(turn_between(run.desired_path.start[row].rotation, run.wanted[row].rotation))
         back = _against_feed(simulator, run, simulation.samples, motions)
-        return PathManner(motions.row[rests], motions.row[back], motions.row[idle])
+        return PathManner(motions.row[rests], motions.row[back], row[turn < IDLE_TURN])
 
 
 def stops(path: Toolpath) -> Bools:
@@ -100,13 +100,18 @@ def _against_feed(
 ) -> Bools:
     """(R,) straight motions against the original's feed where they start, in their middle and where they end."""
     row = motions.row
-    path = run.wanted[row].position - run.desired_path.start[row].position
     back = ~run.desired_path.arc[row]
     for at in (motions.start, motions.middle, motions.end):
         asked = np.flatnonzero(back)
-        place = at[asked]
-        feed = simulator.path.tangent(samples.place.row[place], samples.place.share[place])
-        back[asked] = np.sum(path[asked] * feed, axis=1) < -AGAINST
+
+        def ask(block: slice, asked: Ints = asked, at: Ints = at) -> None:
+            some = asked[block]
+            path = run.wanted[row[some]].position - run.desired_path.start[row[some]].position
+            place = at[some]
+            feed = simulator.path.tangent(samples.place.row[place], samples.place.share[place])
+            back[some] = np.sum(path * feed, axis=1) < -AGAINST
+
+        each_block(ask, len(asked))
     return np.asarray(back)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints, sums
+from postproc.base.batches import each_block
 from postproc.base.geometry import Poses, lengths, turn_between
 from postproc.base.units import MM
 from postproc.compensation.problem import CompensationProblem
@@ -260,9 +261,13 @@ class Simulator:
         count = len(path.reach)
         vertices = np.union1d(rows, rows + 1)
         vertices = vertices[vertices < count]
-        off, turn = path.departure(vertices)
         shows = np.zeros(count + 1, bool)
-        shows[vertices] = (off > SHOWS) | (turn > SHOWS_TURN)
+
+        def fill(block: slice) -> None:
+            off, turn = path.departure(vertices[block])
+            shows[vertices[block]] = (off > SHOWS) | (turn > SHOWS_TURN)
+
+        each_block(fill, len(vertices))
         return (shows[rows] | shows[rows + 1]).astype(np.int64)
 
     def _sampled(

@@ -109,8 +109,13 @@ def place_tool(
         placed.command[some] = path.at(motion[some], share[some]).position
 
     each_block(fill_command, len(unknown))
-    interval, part = track_commands(grid, stretch, placed.command)
-    guess = interval + part
+    guess, between = _between_known(placed, stretch, known)
+    asked = np.flatnonzero(~between)
+    if len(asked):
+        interval, part = track_commands(grid, stretch[asked], placed.command[asked])
+        guess[asked] = interval + part
+    interval = np.minimum(guess.astype(np.int64), grid.first[stretch + 1] - 2)
+    part = guess - interval
     todo = np.flatnonzero(~placed.settled | ~(np.abs(guess - placed.guess) <= SAME_GUESS))
     low, high = grid.first[stretch], grid.first[stretch + 1] - 2
 
@@ -149,6 +154,30 @@ def place_tool(
         if not walked:  # where it leaps now both sides are as near
             break
     return placed
+
+
+def _between_known(
+    placed: PlacedTool, stretch: Ints, known: tuple[PlacedTool, Ints] | None
+) -> tuple[Floats, Bools]:
+    """(S,) places of the commands on those stretches on which the commands that are placed already go on along the
+    path as they go on themselves: their own, and of others those in between; and which (S,) are on such."""
+    guess, step = placed.guess.copy(), np.append(0.0, lengths(np.diff(placed.command, axis=0)))
+    if known is None:
+        return guess, np.zeros(len(guess), bool)
+    own, gone = np.sort(known[1]), np.cumsum(step)
+    same = stretch[own[1:]] == stretch[own[:-1]]
+    arc, moved = np.diff(placed.arc[own]), np.diff(gone[own])
+    even = (np.abs(arc) <= LEAP * moved + LEAST_LEAP) & placed.settled[own[1:]] & placed.settled[own[:-1]]
+    between = ~np.isin(stretch, stretch[own[1:][same & ~even]])
+    new = np.flatnonzero(between & np.isnan(guess))
+    after = np.searchsorted(own, new)
+    inside = (after > 0) & (after < len(own))
+    ends = own[np.clip(np.stack([after - 1, after]), 0, len(own) - 1)]
+    inside &= (stretch[ends] == stretch[new]).all(axis=0)
+    between &= ~np.isin(stretch, stretch[new[~inside]])
+    share = (gone[new] - gone[ends[0]]) / np.maximum(gone[ends[1]] - gone[ends[0]], 1e-12)
+    guess[new] = placed.place[ends[0]] + share * (placed.place[ends[1]] - placed.place[ends[0]])
+    return guess, between
 
 
 def _beside_leaps(placed: PlacedTool, stretch: Ints) -> Iterator[tuple[Ints, Floats]]:
