@@ -373,5 +373,7 @@ def test_a_program_that_leaves_cuts_as_they_are_is_not_written(shop):
     assert not (shop / "learned" / "part.src").exists()
     assert result["next_program"] is None
     promise = result["promise"]
+    # 37 of 59 points stay 0.3 mm RMS off by the shipped robot and forces, which are a third too small
+    assert 1.2 * 0.296 < promise["after_rms_mm"] < 2.0 * 0.296
     assert promise["after_rms_mm"] > promise["before_rms_mm"]
     assert promise["lower_rms_mm"] < promise["after_rms_mm"] < promise["upper_rms_mm"]
