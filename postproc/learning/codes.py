@@ -169,7 +169,7 @@ CODES = define(
         "LRN021": Code(
             "warning",
             "measured places are not corrected",
-            meaning="Points lie on motions that the next program leaves as they are; another finding says why.",
+            meaning="Points lie on motions that the next program leaves as they are; another finding names the cause.",
             consequence="Their whole deflection stays on the next part; the promise considers it.",
             action="Remove the cause that the other finding names, or keep the program that cut the measured part.",
             example="A cut on which a wide gap of an axis changes its side (COR016).",
