@@ -451,7 +451,19 @@ def test_the_outer_axis_moves_continuously_over_the_pole():
     assert np.abs(outer).max() == pytest.approx(3.0, abs=0.01)
 
 
-@pytest.mark.parametrize(("first", "last"), [(0.5, 12.0), (3.0, 30.0), (-4.0, 9.0), (20.0, 2.0), (5.0, 5.0)])
+@pytest.mark.parametrize(
+    ("first", "last"),
+    [
+        (0.5, 12.0),
+        (3.0, 30.0),
+        (-4.0, 9.0),
+        (20.0, 2.0),
+        (5.0, 5.0),
+        (183.0, 195.0),
+        (171.0, 184.0),
+        (-171.0, -184.0),
+    ],
+)
 def test_the_shortest_of_many_segments_is_known(first, last):
     """They are even in u = asinh(lean / POLE); the shortest lies where the axes are nearest to their pole."""
     text = f"G43.4 H1\nG1 X0. Y0. Z0. B{first} C0. F1000\nG1 X100. B{last} C40.\n"
