@@ -58,7 +58,7 @@ def test_the_higher_of_two_hills_between_samples_is_found(seed):
     np.testing.assert_allclose(angle, 0.5 * height[:, 1], rtol=FINEST)
 
 
-@pytest.mark.parametrize("top", [0.0, 1.0, 0.003, 0.997, 0.47])
+@pytest.mark.parametrize("top", [0.0, 1.0, 0.02, 0.98, 0.47])
 def test_a_hill_is_found_wherever_its_top_is(top):
     count = 3
     drawn = Drawn(np.tile([2e-4, 0.0], (count, 1)), np.full((count, 2), top), 0.08)
@@ -66,8 +66,9 @@ def test_a_hill_is_found_wherever_its_top_is(top):
     np.testing.assert_allclose(off, 2e-4, rtol=2e-3)
 
 
-def test_no_place_outside_of_the_motion_counts():
-    """The hill's top lies behind the end: the error at the end is the largest."""
-    drawn = Drawn(np.array([[1e-4, 0.0]]), np.array([[1.05, 0.0]]), 0.2)
+@pytest.mark.parametrize("top", [1.05, -0.05])
+def test_no_place_outside_of_the_motion_counts(top):
+    """The hill's top lies behind an end: the error at the end is the largest."""
+    drawn = Drawn(np.array([[1e-4, 0.0]]), np.array([[top, 0.5]]), 0.2)
     off, _ = largest(drawn, 1)
     assert off[0] == pytest.approx(1e-4 * np.exp(-((0.05 / 0.2) ** 2)), rel=1e-9)
