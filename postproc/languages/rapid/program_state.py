@@ -53,6 +53,11 @@ class ProgramState:
     def put(self, name: bytes, value: Value) -> None:
         self.values = self.values.set(name, value)
 
+    def forget_own(self, routine: bytes) -> None:
+        """Takes out the data of a routine that does not outlive it."""
+        for name in [name for name, _ in self.values.items() if name.startswith(routine + b"/")]:
+            self.values = self.values.set(name, None)
+
     def is_same(self, other: ProgramState) -> bool:
         """Whether the same holds in both."""
         apart = self.last == other.last and _JOINS.values(self) == _JOINS.values(other)
