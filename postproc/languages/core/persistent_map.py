@@ -16,7 +16,8 @@ _EMPTY: tuple[Any, ...] = (None,) * WIDTH
 
 Merge = Callable[[Any, Any, Any], Any]
 """The value of a key from its values in two maps, None where one has none."""
-_Merges = dict[tuple[int, int, int], tuple[Any, ...]]
+_Node = tuple[Any, ...]
+_Merges = dict[tuple[int, int, int], tuple[_Node, _Node, _Node]]
 """Numbers of the first key of two nodes, and of these -> both, and what they were merged to."""
 MOST_MERGES = 50_000
 """Merges of nodes that are remembered."""
