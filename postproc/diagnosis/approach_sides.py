@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.base.arrays import Floats, Ints
+from postproc.base.arrays import Floats
 from postproc.base.findings import Finding
 from postproc.diagnosis.candidates import candidates
 from postproc.diagnosis.diagnosis import Diagnosis, diagnose
@@ -18,6 +18,7 @@ from postproc.diagnosis.search_result import Search
 from postproc.diagnosis.selection import basis_of, outside
 from postproc.diagnosis.verdict import AS_WELL, OTHER_COURSE
 from postproc.identification.campaign import Campaign
+from postproc.identification.joint_scatter import visits_of
 from postproc.model import StiffnessModel
 
 SOUND = ("nothing_missing", "named")
@@ -138,7 +139,7 @@ def _shown(done: Diagnosis) -> list[tuple[int, Floats]]:
     above = -1.0 if fitted.campaign.readings.deflection and gaps else 1.0
     campaign = fitted.campaign
     weight = fitted.plain_weights.weight[:, :3] ** 2
-    visit = _visits(campaign.pose)
+    visit = visits_of(campaign.pose)
     residual = np.nan_to_num(fitted.point.residual[:, :3])
     names = [joint.name for joint in fitted.model.robot.joints]
     squares, coordinates = float((weight * residual**2).sum()), int((weight > 0).sum())
@@ -156,8 +157,3 @@ def _shown(done: Diagnosis) -> list[tuple[int, Floats]]:
             entries.append((gain, names.index(variable.split(" over ")[0]), -above * np.sign(along)[visit]))
     entries.sort(key=lambda entry: -entry[0])
     return [(joint, sides) for gain, joint, sides in entries[:JOINTS] if gain > 0]
-
-
-def _visits(pose: Ints) -> Ints:
-    """(R,) number of the visit of each reading: rows of one pose after each other are one."""
-    return np.asarray(np.cumsum(np.append(0, np.diff(pose) != 0)))

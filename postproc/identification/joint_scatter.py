@@ -99,8 +99,10 @@ def scatter_of(fitted: Fit) -> Scatter | None:
 
     pose, moves = weights.pose, flat(_joints(fitted))
     # who comes back to a pose comes to rest anew
-    visit = np.cumsum(np.append(0, pose[1:] != pose[:-1]))
-    parts = Part(flat(_shifts(weights)), np.repeat(pose, width)), Part(moves, np.repeat(visit, width))
+    parts = (
+        Part(flat(_shifts(weights)), np.repeat(pose, width)),
+        Part(moves, np.repeat(visits_of(pose), width)),
+    )
     q = basis(flat(np.concatenate(point.required_columns, axis=2)))
     z = flat(point.residual[..., None])[:, 0]
     z = z - q @ (q.T @ z)
@@ -131,6 +133,11 @@ def with_scatter_of_joints(fitted: Fit) -> Fit:
     unit = scales(fitted.unknowns)
     gain = fitted.covariance / np.outer(unit, unit) / fitted.factor @ outside[: len(moves)].T
     return replace(fitted, covariance=fitted.covariance + scatter.excess(gain) * np.outer(unit, unit))
+
+
+def visits_of(pose: Ints) -> Ints:
+    """(R,) number of the visit of each reading, by their ``pose`` (R,): rows of one pose after each other are one."""
+    return np.asarray(np.cumsum(np.append(0, np.diff(pose) != 0)))
 
 
 def _shifts(weights: Weighting) -> Floats:
