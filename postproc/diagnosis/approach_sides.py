@@ -44,18 +44,18 @@ def diagnose_sides(
     """The diagnosis, and what was assumed of the sides of approach where the columns DIR do not state them.
 
     They are unknown first: every gear lies in the middle of its gap, or where its load puts it.  Where that leaves
-    something, the order of the rows is tried, then sides by the residuals of one joint, each at the price of a bit for
-    every visit of a pose; these only where an effect of approach then explains all of it.
+    something that effects of approach may explain, however much scatter may be like it (readings of a pose share the
+    side of its approach, as they share an error), the order of the rows is tried.  Where more than scatter is left,
+    then sides by the residuals of one joint, each at the price of a bit for every visit of a pose; these only where an
+    effect of approach then explains all of it.
     """
     readings = campaign.readings
     if readings.direction is not None:
         return diagnose(campaign, model, stage), ()
     unknown = Campaign(replace(readings, direction=np.zeros_like(readings.q)), campaign.stated_tool)
     done = diagnose(unknown, model, stage)
-    if done.verdict.word in SOUND and not done.verdict.conditional:
-        return done, ()
-    stage("trying sides of approach")
     if may_explain(campaign, done):
+        stage("trying sides of approach")
         other = diagnose(campaign, model, goes_on=by_approach)
         if _is_better(other, done):
             return other, (_finding(readings.where(0)[0], "they are taken from the order of the rows"),)
