@@ -90,7 +90,7 @@ def test_entry_ramps_over_the_radius():
     cut = run(path_through([[-8 + entered - 0.01, 0, -5], [-8 + entered + 0.01, 0, -5]]), BLOCK, FLAT)
     half = np.arccos((8 - entered) / 8) / DEG
     within_goal(
-        "entry into a face", "angle deg", angles_off(cut, 1, (90 - half) * DEG, (90 + half) * DEG), 0.2
+        "entry into a face", "angle deg", angles_off(cut, 1, (90 - half) * DEG, (90 + half) * DEG), 0.1
     )
 
 

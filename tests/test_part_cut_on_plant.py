@@ -151,9 +151,9 @@ def test_the_part_as_written_is_the_one_that_the_machine_cuts(reported):
         large = deflections(program)
         for name, share in (("wall", 0.005), ("floor", 0.005), ("wave", 0.02)):
             apart = float(np.abs(found[name][0] - found[name][1]).max())
-            print(
-                f"{name}: deflection {large[name]:.3f} mm, report within {1e3 * apart:.1f} um, {apart / large[name]:.2%}"
-            )
+            allowed = 2e-3 + share * large[name]  # 2 um, and what the goal of the force is worth
+            print(f"{name}: largest deflection {large[name]:.3f} mm; apart by {1e3 * apart:.1f} um,", end=" ")
+            print(f"{1e3 * allowed:.1f} allowed, reported")
             assert apart < allowed, name
         assert np.percentile(np.abs(error - true), 99) < 8e-3
         for name, most in (("wall", 6e-3), ("floor", 1e-3), ("wave", 12e-3)):
