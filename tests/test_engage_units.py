@@ -107,7 +107,7 @@ def test_a_drill_that_drills_is_none_of_them(folder):
     assert found(folder, "STK025", 0) == []
 
 
-def test_what_is_stated_once_is_said(folder):
+def test_what_is_stated_once_is_reported(folder):
     """A tool stated twice as thick contradicts no cut; a second statement of its diameter would."""
     (one,) = found(folder, "STK029", 0)
     assert (one["severity"], one["line"]) == ("info", 3)
@@ -121,7 +121,7 @@ def test_what_is_stated_once_is_said(folder):
 
 
 @pytest.mark.parametrize(("bottom", "below"), [(-30, None), (-5, None), (-2, 3)])
-def test_a_blank_that_is_cut_through_is_said(folder, bottom, below):
+def test_a_blank_that_is_cut_through_is_reported(folder, bottom, below):
     state(folder, f"stock: {{box: [[0, 0, {bottom}], [100, 60, 0]]}}\n" + tool())
     findings = found(folder, "STK030", 0)
     assert len(findings) == (below is not None)
