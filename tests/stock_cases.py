@@ -33,6 +33,21 @@ BULL = Cutter(1, "bull", 8 * MM, length=30 * MM, corner=2 * MM, teeth=3, helix=n
 CONE = Cutter(1, "cone", 8 * MM, length=30 * MM, taper=np.pi / 6, tip=1 * MM, teeth=3, helix=np.pi / 6)
 
 
+GOALS: list[tuple[str, str, float, float]] = []
+"""What ``within_goal`` has seen: case, figure, how far off, goal."""
+
+
+def within_goal(case, figure, off, goal):
+    """How far a figure of a case with a known truth is off, against its goal; ``goal_cases`` prints the table."""
+    GOALS.append((case, figure, float(off), goal))
+    assert off < goal, (case, figure)
+
+
+def force_off(force, truth):
+    """%, of the size of the true force."""
+    return 100 * float(np.linalg.norm(force - truth) / np.linalg.norm(truth))
+
+
 def block(low, high):
     """A box, corners in mm."""
     return box_blank(np.array(low, float) * MM, np.array(high, float) * MM)

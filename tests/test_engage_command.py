@@ -130,7 +130,7 @@ def test_a_tool_without_teeth_is_geometry_only(folder):
     result = json.loads(out.stdout)
     jsonschema_rs.validate(schema_of("engage"), result)
     assert result["force"] == {"max_n": None, "mean_n": None, "ci95": None}
-    assert [finding["code"] for finding in result["findings"]] == ["STK015", "STK017"]
+    assert [finding["code"] for finding in result["findings"]] == ["STK015", "STK017", "STK029"]
     assert "teeth, helix, spindle (or S in the program), material" in result["findings"][0]["message"]
 
 
@@ -153,7 +153,7 @@ def test_a_holder_wider_than_its_clearance_has_its_line(folder):
     assert {"line": 5, "part": "holder"} in result["collisions"]
     found = [one for one in result["findings"] if one["code"] == "STK012"]
     assert found
-    assert "the holder is in the stock" in found[0]["message"]
+    assert "the shank and the holder are in the stock" in found[0]["message"]
     call(folder, "--strict", "--csv", folder / "out.csv", code=1)
     assert not (folder / "out.csv").exists()
     clear = TOOLS.replace("length: 40,", "length: 5.2, shank: 15, holder: {diameter: 40, from: 5.5},")
@@ -200,6 +200,18 @@ def test_a_holder_wider_than_its_clearance_has_its_line(folder):
         (STOCK + TOOLS + "operations: []\n", "YML004", ["stock"], 5),
         (TOOLS, "YML003", ["stock"], None),
         (STOCK + TOOLS.replace("shape: flat,", "shape: bull, corner_radius: 9,"), "YML004", ["radius"], 3),
+        (
+            STOCK + TOOLS.replace("defaults", "  01: {shape: ball, diameter: 6}\ndefaults"),
+            "YML004",
+            ["stated twice"],
+            4,
+        ),
+        (
+            STOCK + TOOLS.replace("shape: flat,", "shape: cone, angle: 1.05,"),  # rad
+            "YML004",
+            ["the edges end at a diameter of 0.733", "below 16 mm"],
+            3,
+        ),
     ],
 )
 def test_what_is_wrong_is_refused(folder, text, code, words, line):
@@ -240,6 +252,11 @@ BOX = cuboid([0, 0, -30], [100, 60, 0])
         (BOX * 1000, "STK005", ["scale: 0.001"]),
         (BOX - np.array([0, 0, 100.0]), "STK008", ["the blank is in"]),
         (BOX[:0], "STK002", ["0 triangles"]),
+        (
+            np.concatenate([BOX, cuboid([130, 0, -30], [150, 60, 0])[:, ::-1]]),
+            "STK004",
+            ["face inward, and is no cavity"],
+        ),
         (np.where(BOX == 60, np.nan, BOX), "STK002", ["not a number"]),
     ],
 )
@@ -247,6 +264,16 @@ def test_a_mesh_that_is_no_blank_is_refused(folder, triangles, code, words):
     write_stl(folder / "blank.stl", triangles)
     state(folder, "stock: {stl: blank.stl}\n" + TOOLS)
     refused(folder, code, *words)
+
+
+def test_a_body_within_another_that_faces_inward_is_a_cavity(folder):
+    """A slot 5 mm deep opens a cavity from 4 to 3 mm below the top: its volume is missing in what is removed."""
+    solid = json.loads(call(folder, "--json", "-").stdout)["removal_mm3"]
+    cavity = cuboid([40, 28, -4], [60, 32, -3])[:, ::-1]
+    write_stl(folder / "blank.stl", np.concatenate([BOX, cavity]))
+    state(folder, "stock: {stl: blank.stl}\n" + TOOLS)
+    removed = json.loads(call(folder, "--json", "-").stdout)["removal_mm3"]
+    assert solid - removed == pytest.approx(20 * 4 * 1, rel=0.1)
 
 
 @pytest.mark.parametrize("cut", [83, 84, 200, -1])

@@ -28,8 +28,9 @@ def found(folder, code, exit=3):
 
 def tool(**changed):
     values = {"diameter": 16, "length": 40, "teeth": 3, "helix": 30, "spindle": 12000} | changed
+    values = {"shape": "flat"} | values
     stated = ", ".join(f"{key}: {value}" for key, value in values.items())
-    return f"tools:\n  1: {{shape: flat, {stated}}}\ndefaults: {{material: EN AW-7075-T6}}\n"
+    return f"tools:\n  1: {{{stated}}}\ndefaults: {{material: EN AW-7075-T6}}\n"
 
 
 @pytest.mark.parametrize(
@@ -45,6 +46,11 @@ def tool(**changed):
             "its holder starts 1524 mm above the tip, which the cell has",
         ),
         ({"length": 600}, "its edges end 600 mm above the tip"),
+        ({"spindle": 72000}, "diameter 16 mm, turns at 72000 1/min"),  # deg/s
+        (
+            {"shape": "drill, point_angle: 118"},
+            "is a drill, and cuts across its axis in 2 motions (the first in line 5)",
+        ),
     ],
 )
 def test_a_tool_of_another_size_is_reported(folder, changed, words):
@@ -81,6 +87,47 @@ def test_passes_that_leave_ridges_contradict_a_diameter(folder):
     state(folder, STOCK + tool(diameter=8))  # the radius
     (one,) = found(folder, "STK025")
     assert "passes that are 10 mm apart (lines 5 to 9): ridges of 2 mm remain between them" in one["message"]
+
+
+def test_passes_that_rise_and_fall_leave_ridges_too(folder):
+    wave = "".join(f"X{x} Z{-2 - (x // 10) % 2}\n" for x in range(-10, 91, 10))
+    back = "".join(f"X{x} Z{-2 - (x // 10) % 2}\n" for x in range(90, -11, -10))
+    head = HEAD.replace("G0 Z-5", "G1 Z-2 F3600")
+    (folder / "part.ngc").write_text(head + wave + "Y20\n" + back + "Y30\n" + wave + "G0 Z30\nM2\n")
+    assert found(folder, "STK025", 0) == []
+    state(folder, STOCK + tool(diameter=8))
+    (one,) = found(folder, "STK025")
+    assert "passes that are 10 mm apart" in one["message"]
+    assert "ridges of 2 mm" in one["message"]
+
+
+def test_a_drill_that_drills_is_none_of_them(folder):
+    (folder / "part.ngc").write_text("G21 G90 G17 G54\nT1 M6\nG0 X30 Y30 Z5\nG1 Z-12 F600\nG0 Z30\nM2\n")
+    state(folder, STOCK + tool(shape="drill, point_angle: 118"))
+    assert found(folder, "STK025", 0) == []
+
+
+def test_what_is_stated_once_is_reported(folder):
+    """A tool stated twice as thick contradicts no cut; a second statement of its diameter would."""
+    (one,) = found(folder, "STK029", 0)
+    assert (one["severity"], one["line"]) == ("info", 3)
+    assert "the diameter of tool 1, 16 mm, is stated here only" in one["message"]
+    (folder / "part.ngc").write_text("(T1 16 mm end mill)\n" + SLOT)
+    assert found(folder, "STK029", 0) == []
+    (folder / "part.ngc").write_text(SLOT)
+    text = (folder / "cell.yaml").read_text()
+    (folder / "cell.yaml").write_text(text.replace("axis: +z}", "axis: +z, diameter: 16}", 1))
+    assert found(folder, "STK029", 0) == []
+
+
+@pytest.mark.parametrize(("bottom", "below"), [(-30, None), (-5, None), (-2, 3)])
+def test_a_blank_that_is_cut_through_is_reported(folder, bottom, below):
+    state(folder, f"stock: {{box: [[0, 0, {bottom}], [100, 60, 0]]}}\n" + tool())
+    findings = found(folder, "STK030", 0)
+    assert len(findings) == (below is not None)
+    for one in findings:
+        assert f"is up to {below} mm below its bottom here, and below it in 2 motions" in one["message"]
+        assert one["line"] == 5
 
 
 def test_a_frame_around_a_part_leaves_no_ridge(folder):
@@ -142,6 +189,41 @@ def test_coefficients_in_another_unit_are_reported(folder, coefficients, words):
     findings = found(folder, "STK028", 0 if words is None else 3)
     assert (findings == []) == (words is None)
     assert words is None or words in " ".join(one["message"] for one in findings)
+
+
+@pytest.mark.parametrize(
+    ("coefficients", "words"),
+    [
+        (OWN.replace("krc: 169", "krc: 0.169"), "krc of 0.169 N/mm2 does not belong to ktc of 767 N/mm2"),
+        (OWN.replace("kac: 222", "kac: 22200"), "kac of 2.22e+04 N/mm2 does not belong to ktc of 767 N/mm2"),
+        (OWN.replace("kre: 26.6", "kre: 0.0266"), "kre of 0.0266 N/mm does not belong to kte of 27.7 N/mm"),
+        (OWN.replace("kae: 0.7", "kae: 700"), "kae of 700 N/mm does not belong to kte of 27.7 N/mm"),
+        (OWN.replace("krc: 169", "krc: 0").replace("kre: 26.6", "kre: 0"), None),  # left out on purpose
+        (OWN.replace("kae: 0.7", "kae: 0.001"), None),
+    ],
+)
+def test_coefficients_that_do_not_belong_to_one_another(folder, coefficients, words):
+    state(folder, STOCK + TOOLS.replace("material: EN AW-7075-T6", coefficients))
+    findings = found(folder, "STK028", 0 if words is None else 3)
+    assert words is None or words in " ".join(one["message"] for one in findings)
+
+
+@pytest.mark.parametrize(
+    ("feed", "spindle", "depth", "chip"),
+    [
+        (60, 12000, 5, "0.00167 mm"),  # mm/s for mm/min
+        (3600, 1257, 5, "0.955 mm"),  # rad/s for 1/min
+        (3600, 1257, 1, None),  # what a cutter for high feeds does
+        (200, 12000, 5, None),
+        (7200, 4000, 5, None),
+    ],
+)
+def test_feeds_per_tooth_of_no_cut(folder, feed, spindle, depth, chip):
+    (folder / "part.ngc").write_text(SLOT.replace("F3600", f"F{feed}").replace("Z-5", f"Z-{depth}"))
+    state(folder, STOCK + tool(spindle=spindle))
+    findings = found(folder, "STK024", 0 if chip is None else 3)
+    assert len(findings) == (chip is not None)
+    assert all(f"a feed per tooth of {chip} here" in one["message"] for one in findings)
 
 
 def test_a_radius_per_minute_is_an_implausible_chip(folder):

@@ -5,7 +5,20 @@ import pytest
 
 pytest.importorskip("numba")
 
-from stock_cases import BALL, BULL, CHIP, CONE, FLAT, KNOWN, MM, block, path_through, run
+from stock_cases import (
+    BALL,
+    BULL,
+    CHIP,
+    CONE,
+    FLAT,
+    KNOWN,
+    MM,
+    block,
+    force_off,
+    path_through,
+    run,
+    within_goal,
+)
 
 from postproc.process.milling_forces import Engagement, engagement, mean_force
 from postproc.toolpath import Arcs, Kind
@@ -24,6 +37,11 @@ def place(cut, row):
     return cut.entry[row] / DEG, cut.exit[row] / DEG
 
 
+def angles_off(cut, row, entry, out):
+    """deg, the larger of both."""
+    return max(abs(cut.entry[row] - entry), abs(cut.exit[row] - out)) / DEG
+
+
 @pytest.mark.parametrize("depth", [5.123, 0.37, 11.9, 0.011])
 @pytest.mark.parametrize("width", [16.0, 8.0, 1.6, 0.5, 0.3, 0.05, 0.01])
 @pytest.mark.parametrize("direction", ["up", "down"])
@@ -34,8 +52,8 @@ def test_slots_and_shoulders(depth, width, direction):
     ends = [[90, y, -depth], [110, y, -depth]]
     cut = run(path_through(ends[::sign]), BLOCK, FLAT)
     force, entry, out = expected("slot" if width == 16 else direction, width * MM, depth * MM)
-    assert place(cut, 1) == pytest.approx((entry / DEG, out / DEG), abs=0.1)
-    assert np.linalg.norm(cut.mean[1, :3] - force) < 0.005 * np.linalg.norm(force)
+    within_goal("slots, shoulders, thin arcs", "angle deg", angles_off(cut, 1, entry, out), 0.1)
+    within_goal("slots, shoulders, thin arcs", "force %", force_off(cut.mean[1, :3], force), 0.5)
     assert cut.depth[1] / MM == pytest.approx(depth, abs=0.01)
     assert cut.width[1] / MM == pytest.approx(width, abs=0.01)
     assert cut.volume[1] / MM**3 == pytest.approx(20 * width * depth, rel=0.005)
@@ -62,8 +80,8 @@ def test_walls_in_any_direction(tilt):
     )
     force, entry, out = expected("down", 0.5 * MM, 5 * MM)
     # fresh material is on the right of the motion back, 0.5 mm of the slot beside
-    assert place(cut, 3) == pytest.approx((entry / DEG, out / DEG), abs=0.1)
-    assert np.linalg.norm(cut.mean[3, :3] - force) < 0.005 * np.linalg.norm(force)
+    within_goal("walls at 17, 45, 88 deg", "angle deg", angles_off(cut, 3, entry, out), 0.1)
+    within_goal("walls at 17, 45, 88 deg", "force %", force_off(cut.mean[3, :3], force), 0.5)
 
 
 def test_entry_ramps_over_the_radius():
@@ -71,7 +89,9 @@ def test_entry_ramps_over_the_radius():
     entered = 3.0  # mm of the radius 8 beyond the face
     cut = run(path_through([[-8 + entered - 0.01, 0, -5], [-8 + entered + 0.01, 0, -5]]), BLOCK, FLAT)
     half = np.arccos((8 - entered) / 8) / DEG
-    assert place(cut, 1) == pytest.approx((90 - half, 90 + half), abs=0.2)
+    within_goal(
+        "entry into a face", "angle deg", angles_off(cut, 1, (90 - half) * DEG, (90 + half) * DEG), 0.1
+    )
 
 
 def test_a_corner_adds_the_engagement_of_both_walls():
@@ -82,7 +102,7 @@ def test_a_corner_adds_the_engagement_of_both_walls():
     x, y = 60.5 - 8 * np.cos(phi), 40.495 + 8 * np.sin(phi)
     stock = np.hypot(x - 60, np.maximum(y - 40, 0)) > 8
     entry, out = phi[stock][[0, -1]] / DEG
-    assert place(cut, 4) == pytest.approx((entry, out), abs=0.1)
+    within_goal("corner", "angle deg", angles_off(cut, 4, entry * DEG, out * DEG), 0.1)
     width = np.trapezoid(np.where(stock, 8 * np.sin(phi), 0.0), phi)
     assert cut.volume[4] / MM**3 == pytest.approx(0.01 * 5 * width, rel=0.005)
 
@@ -100,7 +120,7 @@ def test_a_ramp_cuts_with_its_bottom_too():
     side, _, _ = expected("slot", 16 * MM, 5 * MM, chip=CHIP * np.cos(3 * DEG))
     thrust = 3 * FLAT.radius * (KNOWN.cutting[1] * CHIP * np.sin(3 * DEG) + KNOWN.edge[1])
     force = side + np.array([0, 0, thrust])
-    assert np.linalg.norm(cut.mean[1, :3] - force) < 0.005 * np.linalg.norm(force)
+    within_goal("ramp", "force %", force_off(cut.mean[1, :3], force), 0.5)
 
 
 def test_a_helical_ramp_removes_what_its_columns_say():
@@ -132,6 +152,7 @@ def test_a_plunge_is_the_thrust_of_its_end_edges():
     thrust = 3 * radius * (krc * CHIP + kre)
     torque = 3 * radius**2 / 2 * (ktc * CHIP + kte)
     # an end edge has an axial force towards the axis, which cancels over a turn
+    within_goal("plunge", "force %", force_off(cut.mean[1, :3], np.array([0, 0, thrust])), 0.5)
     assert cut.mean[1] == pytest.approx([0, 0, thrust, 0, 0, torque], rel=1e-3, abs=1e-3 * thrust)
     assert cut.volume[1] / MM**3 == pytest.approx(np.pi * 64, rel=1e-3)
     assert cut.exit[1] - cut.entry[1] == pytest.approx(2 * np.pi, abs=1e-6)
@@ -180,7 +201,7 @@ def integrated(cutter, depth, chip=CHIP, slices=4000, angles=4000, beside=None):
 def test_slots_of_curved_cutters(cutter, depth, limit):
     cut = run(path_through([[95, 0, -depth], [105, 0, -depth]]), BLOCK, cutter)
     force, rate = integrated(cutter, depth * MM)
-    assert np.linalg.norm(cut.mean[1, :3] - force) < limit * np.linalg.norm(force)
+    within_goal(f"slots: {cutter.shape}", "force %", force_off(cut.mean[1, :3], force), 100 * limit)
     assert cut.volume[1] == pytest.approx(rate * 10 * MM, rel=limit)
 
 
@@ -197,7 +218,9 @@ def test_rows_beside_one_another(cutter, depth, limit, beside):
     kinds = [Kind.PTP, Kind.LIN, Kind.PTP, Kind.LIN]
     cut = run(path_through(points, kinds=kinds), BLOCK, cutter)
     force, rate = integrated(cutter, depth * MM, beside=beside * MM)
-    assert np.linalg.norm(cut.mean[3, :3] - force) < limit * np.linalg.norm(force)
+    within_goal(
+        f"rows with ae 0.2 to 2 mm: {cutter.shape}", "force %", force_off(cut.mean[3, :3], force), 100 * limit
+    )
     assert cut.volume[3] == pytest.approx(rate * 10 * MM, rel=limit)
 
 
@@ -229,7 +252,7 @@ def test_a_tilted_ball(tilt):
         (t * s - n * sk * c - a * ck * c).sum(),
         (n * ck - a * sk).sum(),
     ]
-    assert np.linalg.norm(cut.mean[1, :3] - force) < 0.02 * np.linalg.norm(force)
+    within_goal("ball tilted by 10 and 30 deg", "force %", force_off(cut.mean[1, :3], force), 2.0)
 
 
 def test_the_force_of_the_first_law_is_that_of_operations():
@@ -305,7 +328,7 @@ def test_short_motions_cut_what_one_long_one_does():
     assert cut.volume[rows] / MM**3 == pytest.approx(new, abs=0.02 * 30)
     assert cut.volume[rows].sum() / MM**3 == pytest.approx(new.sum(), rel=0.002)
     force, _, _ = expected("down", 6 * MM, 5 * MM)
-    assert np.linalg.norm(cut.mean[-2, :3] - force) < 0.005 * np.linalg.norm(force)
+    within_goal("short motions", "force %", force_off(cut.mean[-2, :3], force), 0.5)
 
 
 def test_collisions_have_their_motion():

@@ -193,7 +193,8 @@ CODES = define(
         "STK024": Code(
             "warning",
             "feed per tooth is implausible",
-            meaning="The feed per tooth is below 0.0005 mm, or above a tenth of the diameter.",
+            meaning="The feed per tooth is below 0.0005 mm or never above 0.0025 mm (of thin tools 0.04 % of the "
+            "diameter), above a tenth of the diameter, or in a deep cut in metal above 4 % of it.",
             consequence="Feed or speed have probably another unit than stated, and the forces are as wrong.",
             action="Compare F, its unit (G94, G95, mm, inches), S and the number of teeth with the machine.",
             example="`F3.6`, meant in m/min, at 12000 1/min: 0.0001 mm per tooth.",
@@ -229,6 +230,22 @@ CODES = define(
             consequence="The correction is wrong by as much.",
             action="State ktc, krc, kac in N/mm2 and kte, kre, kae in N/mm.",
             example="`kte: 27700`: that is 27.7 N/mm in N/m.",
+        ),
+        "STK029": Code(
+            "info",
+            "diameter of the tool is stated once",
+            meaning="Neither the cell nor a comment of the program states the diameter of this tool.",
+            consequence="A wrong one that no cut contradicts is not found: forces and part are those of another tool.",
+            action="State `diameter` of the tool in the cell too: both are compared.",
+            example="`1: {shape: flat, diameter: 32}` for a cutter of 16 mm.",
+        ),
+        "STK030": Code(
+            "info",
+            "blank is cut through",
+            meaning="While it cuts the tip is below the bottom of the box around the blank.",
+            consequence="The part is open there, or the blank is stated too thin: what is below it has no force.",
+            action="Compare the bottom of the blank with the program, and with what is below it.",
+            example="A blank of 5 mm for a program that cuts 8 mm deep.",
         ),
     }
 )

@@ -17,7 +17,7 @@ from postproc.base.findings import Finding
 from postproc.base.units import MM
 from postproc.process.stock.blank import corners_of
 from postproc.process.stock.cutters import Cutter
-from postproc.process.stock.distance import AXIS, CUTTER, REMOVES, STEP, TIP_POINT
+from postproc.process.stock.distance import AXIS, CUTTER, REMOVES, STEP, TIP_POINT, TURN
 from postproc.process.stock.engagement import EngagedMotions
 from postproc.process.stock.motion_sweeps import MotionSweeps
 from postproc.process.stock.stock_section import StockProcess
@@ -31,15 +31,20 @@ DEEPEST_SLOT, DEEPEST = 4.0, 12.0
 _WIDE = 0.5
 FASTEST = 5000.0 / 60
 """[m/s] of the edges: nothing is cut faster."""
+FASTEST_TURN, TURNS_FAST = 60000 * 2 * np.pi / 60, 10.0 * MM
+"""[rad/s] of a spindle that takes cutters above that diameter."""
 FINEST_PITCH = 0.25 * MM
 """From tooth to tooth around the tool."""
 LARGEST_FORCE, LARGEST_POWER = 10e3, 200e3
 """[N], [W]: no robot and no spindle has more."""
 SOFTEST, HARDEST, SHARPEST, BLUNTEST = 1e6, 2e10, 1e6, 1.0 * MM
 """[Pa] of Ktc: foam and superalloys; [N/m] of Kte; and of Kte over Ktc, which is of the size of the edges' radius."""
+LEAST_ASIDE, MOST_ASIDE = 0.005, 10.0
+"""Of the tangential coefficient: the radial one, and any other."""
 _TIMES_THE_BLANK, _LONG_BLANK, _SMALL_PROGRAM = 4.0, 2.0, 0.1
-_PARALLEL, _SQUARE = 0.999, 0.05  # cosines
+_PARALLEL, _SQUARE, _ALONG = 0.999, 0.05, 0.996  # cosines
 _SHORT = 1e-6  # m
+_UPRIGHT, _THROUGH = 0.9, 1e-6  # cosine, m
 
 _RATIOS = {
     25.4: "one of them is in inches",
@@ -69,7 +74,8 @@ def contradictions(
     tip: Mapping[int, float],
     program: str,
 ) -> list[Finding]:
-    """STK025 to STK028.  diameters: of the cell's tools by number [m]; tip: from the flange to their tips [m]."""
+    """STK025 to STK028, STK030.  diameters: of the cell's tools by number [m]; tip: from the flange to their tips
+    [m]."""
     findings = []
     path = str(process.path)
     for index, cutter in enumerate(sweeps.cutters):
@@ -88,16 +94,17 @@ def contradictions(
         speed = process.edges[cutter.number].speed
         turning = np.abs(toolpath.spindle[rows]) if speed is None else np.array([speed])
         known = turning[np.isfinite(turning)]
-        fast = float(known.max()) * cutter.radius if len(known) else 0.0
         for message, help in (
             *_sizes(cutter, found, diameters.get(cutter.number), tip.get(cutter.number)),
-            *_edges(cutter, fast),
+            *_edges(cutter, float(known.max(initial=0.0))),
+            *_sideways(cutter, index, sweeps, cut.cuts, toolpath),
         ):
             findings.append(Finding("STK025", message, path, cutter.line, help=help))
         for message, help in _ridges(cutter, index, sweeps, cut.cuts, toolpath):
             findings.append(Finding("STK025", message, path, cutter.line, help=help))
         for message, help in _forces(cutter, found, process):
             findings.append(Finding("STK028", message, path, cutter.line, help=help))
+    findings += _through(sweeps, cut, toolpath, program)
     findings += [
         Finding("STK026", message, path, process.line, help=help) for message, help in _blank(sweeps, cut)
     ]
@@ -168,8 +175,13 @@ def _reason(ratio: float) -> str:
     return "state the diameter in mm in both files"
 
 
-def _edges(cutter: Cutter, fast: float) -> Iterator[tuple[str, str]]:
-    """fast [m/s]: the largest speed of the edges."""
+def _edges(cutter: Cutter, turning: float) -> Iterator[tuple[str, str]]:
+    """turning [rad/s]: the largest speed of the spindle."""
+    fast = turning * cutter.radius
+    if turning > FASTEST_TURN and 2 * cutter.radius > TURNS_FAST:
+        wide = 2 * cutter.radius / MM
+        message = f"tool {cutter.number}, diameter {wide:.6g} mm, turns at {turning * 30 / np.pi:.6g} 1/min"
+        yield message, "no spindle turns a cutter above 10 mm so fast; state spindle in 1/min"
     if fast > FASTEST:
         wide = 2 * cutter.radius / MM
         message = f"the edges of tool {cutter.number}, diameter {wide:.6g} mm, move at {fast * 60:.5g} m/min"
@@ -183,21 +195,50 @@ def _edges(cutter: Cutter, fast: float) -> Iterator[tuple[str, str]]:
         yield message, "compare diameter (mm) and teeth"
 
 
+def _sideways(
+    cutter: Cutter, index: int, sweeps: MotionSweeps, cuts: Bools, toolpath: Toolpath
+) -> Iterator[tuple[str, str]]:
+    """A drill that cuts across its axis."""
+    if cutter.shape != "drill":
+        return
+    own = np.flatnonzero((sweeps.which == index) & (sweeps.rows[:, REMOVES] > 0) & cuts[sweeps.motion])
+    step = sweeps.rows[own, STEP : STEP + 3]
+    size = np.linalg.norm(step, axis=1)
+    along = np.abs(np.einsum("mi,mi->m", step, sweeps.rows[own, AXIS : AXIS + 3]))
+    across = np.unique(sweeps.motion[own[(size > _SHORT) & (along < _ALONG * size)]])
+    if len(across):
+        message = (
+            f"tool {cutter.number} is a drill, and cuts across its axis in {len(across)} motions (the first in line"
+            f" {toolpath.line[across[0]]})"
+        )
+        yield (
+            message,
+            "a drill has no edges at its side: is the shape another one, or the tool of another program?",
+        )
+
+
 def _ridges(
     cutter: Cutter, index: int, sweeps: MotionSweeps, cuts: Bools, toolpath: Toolpath
 ) -> Iterator[tuple[str, str]]:
-    """Zigzags in the material whose neighbouring passes are farther apart than the tool is wide."""
+    """Zigzags in the material whose neighbouring passes are farther apart than the tool is wide, seen along the
+    spindle: they may rise and fall."""
     own = np.flatnonzero((sweeps.which == index) & (sweeps.rows[:, REMOVES] > 0))
-    step = sweeps.rows[own, STEP : STEP + 3]
-    size = np.linalg.norm(step, axis=1)
-    own, step, size = own[size > _SHORT], step[size > _SHORT], size[size > _SHORT]
+    step, axis = sweeps.rows[own, STEP : STEP + 3], sweeps.rows[own, AXIS : AXIS + 3]
+    rise = np.einsum("mi,mi->m", step, axis)
+    size = np.linalg.norm(step - rise[:, None] * axis, axis=1)
+    moves = size > _SHORT
+    own, step, axis, rise, size = own[moves], step[moves], axis[moves], rise[moves], size[moves]
     if len(own) < 5:
         return
-    way = step / size[:, None]
-    level = np.abs(np.einsum("mi,mi->m", way, sweeps.rows[own, AXIS : AXIS + 3])) < _SQUARE
-    joined = (np.diff(own) == 1) & (sweeps.rows[own[1:], CUTTER] == sweeps.rows[own[:-1], CUTTER])
+    way = (step - rise[:, None] * axis) / size[:, None]
+    level = (np.abs(rise) < size) & ~sweeps.rows[own, TURN : TURN + 3].any(axis=1)
+    order = np.cumsum(
+        np.linalg.norm(sweeps.rows[:, STEP : STEP + 3], axis=1) > _SHORT
+    )  # some motions move nothing
+    joined = (np.diff(order[own]) == 1) & (sweeps.rows[own[1:], CUTTER] == sweeps.rows[own[:-1], CUTTER])
     tip = sweeps.rows[own, TIP_POINT : TIP_POINT + 3]
     joined &= np.linalg.norm(tip[1:] - tip[:-1] - step[:-1], axis=1) < _SHORT
+    joined &= np.einsum("mi,mi->m", axis[1:], axis[:-1]) > 1 - 1e-9
     goes_on = joined & (np.einsum("mi,mi->m", way[1:], way[:-1]) > _PARALLEL)
     first = np.flatnonzero(np.append(True, ~goes_on))  # of each straight part of the path
     linked = np.append(False, joined)[first]
@@ -235,7 +276,8 @@ def _forces(cutter: Cutter, found: _StatedCut, process: StockProcess) -> Iterato
     material = process.edges[cutter.number].material
     name = f"tool {cutter.number}"
     if material is not None:
-        ktc, kte = material.coefficients.cutting[0], material.coefficients.edge[0]
+        cutting, edge = material.coefficients.cutting, material.coefficients.edge
+        ktc, kte = cutting[0], edge[0]
         if not SOFTEST <= ktc <= HARDEST:
             message = f"{name}: ktc of {ktc / 1e6:.4g} N/mm2 is that of no material"
             yield message, "1 N/mm2 is foam, 5000 N/mm2 a superalloy; state ktc, krc, kac in N/mm2"
@@ -244,12 +286,48 @@ def _forces(cutter: Cutter, found: _StatedCut, process: StockProcess) -> Iterato
                 f"{name}: kte of {kte / 1e3:.4g} N/mm belongs to no edge for ktc of {ktc / 1e6:.4g} N/mm2"
             )
             yield message, "usual are some N/mm, 0.01 to 0.1 mm times ktc; state kte, kre, kae in N/mm"
+        for names, values, unit, scale in (
+            (("krc", "kac"), cutting, "N/mm2", 1e6),
+            (("kre", "kae"), edge, "N/mm", 1e3),
+        ):
+            for other, value in zip(names, values[1:], strict=True):
+                # the axial one may be as small as it likes
+                if value > MOST_ASIDE * values[0] > 0 or (
+                    other[1] == "r" and 0 < value < LEAST_ASIDE * values[0]
+                ):
+                    message = (
+                        f"{name}: {other} of {value / scale:.4g} {unit} does not belong to kt{other[2]} of"
+                        f" {values[0] / scale:.4g} {unit}"
+                    )
+                    yield message, f"usual is 0.1 to 1 times as much; state both in {unit}"
     if found.force > LARGEST_FORCE or found.power > LARGEST_POWER:
         message = (
             f"{name} has a mean force of up to {found.force:.4g} N and a power of up to {found.power / 1e3:.4g} kW: no"
             " robot mills with that"
         )
         yield message, "compare coefficients (N/mm2, N/mm), depth of cut and feed with the machine"
+
+
+def _through(
+    sweeps: MotionSweeps, cut: EngagedMotions, toolpath: Toolpath, program: str
+) -> Iterator[Finding]:
+    """Where tips leave the box around the blank on the side to which the tool points, while they cut."""
+    low, high = corners_of(cut.stock.blank)
+    own = np.flatnonzero((sweeps.rows[:, REMOVES] > 0) & cut.cuts[sweeps.motion])
+    rows = sweeps.rows[own]
+    axis, tip, step = (rows[:, at : at + 3] for at in (AXIS, TIP_POINT, STEP))
+    beyond = np.full(len(own), -np.inf)
+    for k in range(3):
+        for sign, face in ((1.0, low[k]), (-1.0, high[k])):
+            deepest = sign * face - np.minimum(sign * tip[:, k], sign * (tip[:, k] + step[:, k]))
+            beyond = np.where(sign * axis[:, k] > _UPRIGHT, deepest, beyond)
+    at = int(np.argmax(beyond))
+    if beyond[at] > _THROUGH:
+        message = (
+            f"the blank is cut through: the tip of a tool that cuts is up to {beyond[at] / MM:.4g} mm below its bottom"
+            f" here, and below it in {len(np.unique(sweeps.motion[own[beyond > _THROUGH]]))} motions"
+        )
+        yield Finding("STK030", message, program, int(toolpath.line[sweeps.motion[own[at]]]))
 
 
 def _blank(sweeps: MotionSweeps, cut: EngagedMotions) -> Iterator[tuple[str, str]]:

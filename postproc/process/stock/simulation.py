@@ -32,6 +32,10 @@ _NO_MOVE = 1e-7  # m
 _SAME_SPEED = 0.001
 _LEAST_CHIP, _LARGEST_CHIP = 0.0005 * MM, 0.1
 """[m] and of the diameter: feeds per tooth beyond have another unit than it seems."""
+_RUBS, _RUBS_OF = 0.0025 * MM, 0.0004
+"""[m] and of the diameter: a tool whose feed per tooth never exceeds the lesser cuts nothing, it rubs."""
+_DEEP, _DEEP_CHIP, _METAL = 0.15, 0.04, 300e6
+"""Of the diameter, depth and feed per tooth that no cutter has in a metal, whose Ktc [Pa] is above."""
 _SMALL = 10 * MM  # a blank that is no longer, or one of 10 m in metres
 
 
@@ -79,9 +83,9 @@ def simulate(path: Path, toolpath: Toolpath, frames: MotionFrames, program: str)
         *_collisions(engagement, toolpath, program),
         *_not_simulated(sweeps, toolpath, program),
         *_lengths(sweeps, process),
-        *_commented(sweeps, commented, toolpath, program),
+        *_commented(sweeps, commented, frames.diameters, str(process.path), toolpath, program),
         *_implausible_chips(
-            sweeps, laws_of(sweeps, toolpath, edges)[:, 0], engagement.cuts, toolpath, program
+            sweeps, laws_of(sweeps, toolpath, edges)[:, 0], engagement, process, toolpath, program
         ),
         *_speeds(sweeps, engagement.cuts, process, toolpath, program),
         *contradictions(
@@ -225,12 +229,14 @@ def _turns(speed: Floats) -> Bools:
 
 def _summaries(run: StockRun, toolpath: Toolpath, path: Path) -> list[Finding]:
     cut, findings = run.engagement, []
+    chip = laws_of(run.sweeps, toolpath, run.process.edges)[:, 0]
     for index, cutter in enumerate(run.sweeps.cutters):
         rows = np.unique(run.sweeps.motion[run.sweeps.rows[:, CUTTER] == index])
         rows = rows[cut.cuts[rows]]
         if not len(rows):
             continue
         size = np.linalg.norm(cut.largest[rows, :3], axis=1)
+        own = (run.sweeps.which == index) & cut.cuts[run.sweeps.motion]
         material = run.process.edges[cutter.number].material
         name = "" if material is None else f"; {material.name}"
         if material is not None and material.ci95 is not None:
@@ -238,8 +244,8 @@ def _summaries(run: StockRun, toolpath: Toolpath, path: Path) -> list[Finding]:
         message = (
             f"tool {cutter.number} cuts in {len(rows)} motions in lines {toolpath.line[rows[0]]} to "
             f"{toolpath.line[rows[-1]]}, removes {cut.volume[rows].sum() / MM**3:.0f} mm3, ap up to "
-            f"{cut.depth[rows].max() / MM:.2f} mm, ae up to {cut.width[rows].max() / MM:.2f} mm, mean force "
-            f"over a turn up to {size.max():.0f} N{name}"
+            f"{cut.depth[rows].max() / MM:.2f} mm, ae up to {cut.width[rows].max() / MM:.2f} mm, feed per "
+            f"tooth up to {chip[own].max() / MM:.3g} mm, mean force over a turn up to {size.max():.0f} N{name}"
         )
         findings.append(Finding("STK014", message, str(path), cutter.line))
     return findings
@@ -248,10 +254,14 @@ def _summaries(run: StockRun, toolpath: Toolpath, path: Path) -> list[Finding]:
 def _collisions(cut: EngagedMotions, toolpath: Toolpath, program: str) -> list[Finding]:
     findings = []
     for row, parts in sorted(cut.hits.items())[:_MOST_FINDINGS]:
-        names = " and ".join(_PARTS[part] for part in parts)
+        names, one = " and ".join(_PARTS[part] for part in parts), len(parts) == 1
         air = toolpath.kind[row] == Kind.PTP or CUTTING in parts
         code = "STK011" if air else "STK012"
-        message = f"{names} touches stock on a rapid motion" if air else f"{names} is in the stock"
+        message = (
+            f"{names} {'touches' if one else 'touch'} stock on a rapid motion"
+            if air
+            else f"{names} {'is' if one else 'are'} in the stock"
+        )
         findings.append(Finding(code, message, program, int(toolpath.line[row])))
     more = len(cut.hits) - len(findings)
     if more > 0:
@@ -285,13 +295,29 @@ def _lengths(sweeps: MotionSweeps, process: StockProcess) -> list[Finding]:
 
 
 def _commented(
-    sweeps: MotionSweeps, commented: Mapping[int, CommentedTool], toolpath: Toolpath, program: str
+    sweeps: MotionSweeps,
+    commented: Mapping[int, CommentedTool],
+    diameters: Mapping[int, float],
+    path: str,
+    toolpath: Toolpath,
+    program: str,
 ) -> list[Finding]:
-    """What is taken from comments of the program, and where the process file states other tools."""
+    """What is taken from comments of the program, where the process file states other tools, and what only it states.
+
+    diameters: of the cell's tools by number [m]."""
     findings = []
     named = read_named_diameters(toolpath)
     for cutter in sweeps.cutters:
         tool = commented.get(cutter.number)
+        if (
+            tool is None
+            and cutter.number not in named
+            and not np.isfinite(diameters.get(cutter.number, np.nan))
+        ):
+            message = (
+                f"the diameter of tool {cutter.number}, {2 * cutter.radius / MM:g} mm, is stated here only"
+            )
+            findings.append(Finding("STK029", message, path, cutter.line))
         if tool is None:
             for one in named.get(cutter.number, ()):
                 if not one.may_be(2 * cutter.radius):
@@ -320,13 +346,23 @@ def _commented(
 
 
 def _implausible_chips(
-    sweeps: MotionSweeps, chip: Floats, cuts: Bools, toolpath: Toolpath, program: str
+    sweeps: MotionSweeps,
+    chip: Floats,
+    cut: EngagedMotions,
+    process: StockProcess,
+    toolpath: Toolpath,
+    program: str,
 ) -> list[Finding]:
     """One finding for each tool; chip (M,) [m]: feed per tooth of the sweeps."""
     findings = []
     for index, cutter in enumerate(sweeps.cutters):
-        own = (sweeps.which == index) & cuts[sweeps.motion]
-        wrong = own & ((chip < _LEAST_CHIP) | (chip > _LARGEST_CHIP * 2 * cutter.radius))
+        wide, material = 2 * cutter.radius, process.edges[cutter.number].material
+        own = (sweeps.which == index) & cut.cuts[sweeps.motion]
+        wrong = own & ((chip < _LEAST_CHIP) | (chip > _LARGEST_CHIP * wide))
+        if np.nanmax(chip[own], initial=0.0) < min(_RUBS, _RUBS_OF * wide):
+            wrong |= own & np.isfinite(chip)
+        if material is not None and material.coefficients.cutting[0] > _METAL:
+            wrong |= own & (chip > _DEEP_CHIP * wide) & (cut.depth[sweeps.motion] > _DEEP * wide)
         if not wrong.any():
             continue
         at = int(np.argmax(wrong))

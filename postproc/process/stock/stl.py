@@ -10,6 +10,8 @@ import re
 from pathlib import Path
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from postproc.base.arrays import Floats, Ints
 from postproc.base.findings import Finding, Refusal
@@ -86,10 +88,39 @@ def _check_closed(corners: Floats, path: Path) -> None:
         raise _refused("STK003", f"the mesh is not closed: {what}", path)
     origin = corners.reshape(-1, 3).mean(axis=0)
     a, b, c = (corners - origin).transpose(1, 0, 2)
-    volume = float(np.einsum("ni,ni->n", a, np.cross(b, c)).sum() / 6)
+    volumes = np.einsum("ni,ni->n", a, np.cross(b, c)) / 6
+    volume = float(volumes.sum())
     if volume <= 0:
         what = f"its volume is {volume / MM**3:.4g} mm3: its triangles face inward"
         raise _refused("STK004", what, path)
+    _check_bodies(corners, index.reshape(-1, 3), count, volumes, path)
+
+
+def _check_bodies(corners: Floats, faces: Ints, count: int, volumes: Floats, path: Path) -> None:
+    """A body whose triangles face inward is a cavity: it has to lie in the material of others."""
+    ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
+    linked = coo_matrix((np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), (count, count))
+    bodies, label = connected_components(linked, directed=False)
+    body = label[faces[:, 0]]
+    signed = np.bincount(body, volumes, bodies)
+    for cavity in np.flatnonzero(signed < 0):
+        inside = body == cavity
+        point = corners[inside][0, 0]
+        if _winds(corners[~inside], point) < 0.25:
+            what = (
+                f"a body at X {point[0] / MM:.6g} Y {point[1] / MM:.6g} Z {point[2] / MM:.6g} mm with the volume"
+                f" {signed[cavity] / MM**3:.4g} mm3 has triangles that face inward, and is no cavity of another"
+            )
+            raise _refused("STK004", what, path)
+
+
+def _winds(corners: Floats, point: Floats) -> float:
+    """How often closed surfaces (F, 3, 3) enclose a point (3,).  Source: van Oosterom and Strackee, 1983."""
+    a, b, c = (corners - point).transpose(1, 0, 2)
+    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+    ab, bc, ca = (np.einsum("ni,ni->n", *pair) for pair in ((a, b), (b, c), (c, a)))
+    over = np.einsum("ni,ni->n", a, np.cross(b, c))
+    return float(np.arctan2(over, la * lb * lc + ab * lc + bc * la + ca * lb).sum() / (2 * np.pi))
 
 
 def _refused(code: str, message: str, path: Path, help: str = "") -> Refusal:

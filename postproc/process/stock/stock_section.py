@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import tan
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +89,8 @@ def read_stock_process(path: Path, commented: Mapping[int, CommentedTool] | None
             raise tools.error(
                 "YML004", f"{key!r} is not the number of a tool", key, "write 1: {shape: flat, ...}"
             )
+        if int(key) in cutters:
+            raise tools.error("YML004", f"tool {int(key)} is stated twice", key, "state each tool once")
         section = tools.section(key)
         own = ProcessValues(section, defaults)
         known = commented.get(int(key))
@@ -157,8 +160,6 @@ def _cutter(
         "length",
         "shank",
         "holder",
-        "teeth",
-        "helix",
         *_EDGES,
         *_SHAPE_KEYS.get(shape, ()),
     )
@@ -188,6 +189,11 @@ def _cutter(
             tip = 0.5 * section.number("tip_diameter", low=0.0, high=1000.0, unit="mm") * MM
             if tip >= radius:
                 raise section.error("YML004", "is not below the diameter", "tip_diameter")
+    if edge is not None and taper is not None and (radius - tip) / tan(taper) > edge * (1 + 1e-6):
+        ends = 2 * (tip + edge * tan(taper)) / MM
+        message = f"the edges end at a diameter of {ends:.4g} mm, below {2 * radius / MM:.6g} mm"
+        help = f"compare {key}, the whole angle in deg, with length and diameter"
+        raise section.error("YML004", message, "length", help)
     if edge is not None and edge < corner:
         raise section.error("YML004", "the edges are shorter than the radius of the corner", "length")
     shank = 0.5 * length("shank") if "shank" in section else None
