@@ -184,8 +184,8 @@ def _beside_leaps(placed: PlacedTool, stretch: Ints) -> Iterator[tuple[Ints, Flo
     """Commands (K,) before and after those at which the place leaps on or back, and the place (K,) on the other side of
     the leap: of two places at which the path is square to the tool, the nearer one counts."""
     step, gone = lengths(np.diff(placed.command, axis=0)), np.diff(placed.arc)
-    leaps = (gone > LEAP * step + LEAST_LEAP) | (gone < -BACK)
-    leaps = np.flatnonzero(leaps & (stretch[1:] == stretch[:-1]))
+    leap = (gone > LEAP * step + LEAST_LEAP) | (gone < -BACK)
+    leaps = np.flatnonzero(leap & (stretch[1:] == stretch[:-1]))
     for side in (0, 1):
         away = np.arange(BESIDE)
         beside = leaps[:, None] + (1 + away if side else -away)
