@@ -1,6 +1,7 @@
 """A small fixed part of ``python -m tests.blind``, and what the benchmark itself must hold."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -119,6 +120,27 @@ UNSEEN = [[Rival("nothing", "", 1.0)]]
 )
 def test_outcomes(word, names, sets, rivals, outcome):
     assert verdicts.outcome_of_words(word, TRUTH, names, sets, False, rivals) == outcome
+
+
+@pytest.mark.parametrize(
+    ("names", "rivals", "outcome"),
+    [
+        (["backlash A2"], [FAR[0], UNSEEN[0]], "unseen"),
+        (["backlash A2", "payload"], [FAR[0], UNSEEN[0]], "exact"),
+        (["backlash A2"], [FAR[0], FAR[0]], "wrong"),
+        (["backlash A2"], [UNSEEN[0], FAR[0]], "wrong"),
+        (["backlash A3"], [FAR[0], UNSEEN[0]], "wrong"),
+        (["hysteresis A4"], [UNSEEN[0], UNSEEN[0]], "wrong"),
+    ],
+)
+def test_what_nobody_could_see_beside_the_rest_may_be_left_out(names, rivals, outcome):
+    hidden = [
+        (SimpleNamespace(effect=e, joint=j, outside=False), 1.0)
+        for e, j in (("backlash", "A2"), ("payload", ""))
+    ]
+    run = SimpleNamespace(hidden=hidden, case=SimpleNamespace(row="pair"))
+    named = [{"effect": one.split()[0], "joints": one.split()[1:]} for one in names]
+    assert verdicts.outcome_of(run, {"verdict": "named", "named": named}, rivals) == outcome
 
 
 def test_nulls_and_outsiders():

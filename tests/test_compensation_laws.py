@@ -90,6 +90,23 @@ def test_what_is_left_is_what_the_robot_does_with_the_commands(said, gain):
     np.testing.assert_allclose(again.correction, result.correction, atol=1e-15)
 
 
+def test_what_is_left_across_the_path_is_what_is_perpendicular_to_the_feed():
+    """Commands off by a known step: along the path, across it, and both."""
+    job = line(tolerance=1e-6)
+    result = correct(job)
+    row = int(np.flatnonzero(result.corrected)[0])
+    feed = job.desired_path.tangent(np.array([row]), np.ones(1))[0]
+    across = np.cross(feed, [0.0, 0.0, 1.0])
+    for along, beside in ((3e-4, 0.0), (0.0, 4e-4), (3e-4, -4e-4)):
+        shift = np.zeros((len(job.toolpath), 3))
+        shift[row] = along * feed + beside * across
+        moved = Poses(result.command[:].rotation, result.command[:].position + shift)
+        found = with_residual(job, result, moved)
+        assert found.after[row] == pytest.approx(np.hypot(along, beside), rel=0.02)
+        assert found.across_after[row] == pytest.approx(abs(beside), rel=0.02, abs=1e-5)
+    assert np.isnan(found.across_after[~result.corrected]).all()
+
+
 @pytest.mark.parametrize("said", SAID)
 def test_commands_turn_only_as_the_text_can_say(said):
     job = task(**SAID[said])

@@ -16,6 +16,7 @@ from postproc.diagnosis.search import model_unknowns
 from postproc.effects import EFFECTS
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import fit
+from postproc.identification.joint_scatter import with_scatter_of_joints
 from postproc.identification.unknowns import PLAUSIBLE
 
 SIGMA = 2e-5
@@ -43,7 +44,7 @@ def deviations(seed):
     design = replace(campaign(rng, 30, stated=True), jitter=0.0)
     seen = read(design, full.with_values(off), rng)
     model = model_of(robot_file(True, False, [("joint_offset", "A3")]))
-    alone = fit(seen, model, model_unknowns(model))
+    alone = with_scatter_of_joints(fit(seen, model, model_unknowns(model)))
     covered = cover_equivalent_models(alone, alone, alone, ())
     true = {f"{full.terms[i].effect.name}.{p}": value for (i, p), value in off.items()}
     one = [e for e in alone.estimates if e.unknown.name in true]

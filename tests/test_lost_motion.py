@@ -7,6 +7,7 @@ import pytest
 from effect_cases import made, nulls, with_terms
 from path_cases import START, circle, line, task
 
+from postproc.base.geometry import Poses, rotation_from_abc, rotation_from_vector
 from postproc.compensation.gap_sides import MotorPath, Reversals
 from postproc.compensation.lost_motion import ROOM, add_lost_motion, dead_band, position_digit
 from postproc.compensation.reversals import find_reversals
@@ -143,6 +144,34 @@ def test_the_dead_band_is_the_tolerance_at_the_tool_the_digits_or_the_gap():
     assert fine.lost_motion.wanted.at(np.array([5]))[0, 0] in (-1.0, 1.0)
 
 
+def test_the_dead_band_holds_the_last_digits_of_angles_where_the_tool_turns():
+    """Axes found anew for targets that are a last digit of each coordinate farther move by the band in all."""
+    job = replace(line(), tolerance=1e-9)
+    turns = rotation_from_abc(
+        np.radians([[0.0, 0.0, 180.0 + 2.0 * (k % 2)] for k in range(len(job.toolpath))])
+    )
+    for turned, path in (
+        (False, job.toolpath),
+        (True, replace(job.toolpath, targets=replace(job.toolpath.targets, rotation=turns))),
+    ):
+        row, robot = 2, job.model.robot.nominal
+        band = dead_band(replace(job, toolpath=path))[row]
+        axes = job.track.q[row : row + 1]
+        flange = job.wanted[row : row + 1] @ job.tool[row : row + 1].inverse()
+        moved = np.zeros(6)
+        for k in range(6 if turned else 3):
+            pose = job.wanted[row : row + 1]
+            if k < 3:
+                pose = Poses(pose.rotation, pose.position + 1e-6 * np.eye(3)[k])
+            else:
+                turn = rotation_from_vector(np.radians(1e-3) * np.eye(3)[k - 3 : k - 2])
+                pose = Poses(turn @ pose.rotation, pose.position)
+            target = pose @ job.tool[row : row + 1].inverse()
+            there = inverse(robot, target, job.track.branch[row : row + 1], axes).q
+            moved += np.abs(there - inverse(robot, flange, job.track.branch[row : row + 1], axes).q)[0]
+        assert band == pytest.approx(moved, rel=0.01, abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ("places", "digit"),
     [([1.0, 20.0], 1e-3), ([1.25, 3.0], 1e-2), ([0.001, 2.0], 1e-3), ([1 / 3, 2 / 3], 1e-6)],
@@ -212,6 +241,8 @@ def test_places_on_the_line_of_motions():
     back = where.place(position)
     assert back[0].tolist() == [0, 1, 2, 1]
     np.testing.assert_allclose(back[1], along)
+    before = where.place(where.position(np.array([-1]), 0.5))
+    assert (before[0].tolist(), before[1].tolist()) == ([0], [0.0])
     near = where.drawn(np.array([1.0005, 1.25, 1.4995]), np.full(3, 1e-3))
     np.testing.assert_allclose(near, [1.0, 1.25, 1.5])
 

@@ -451,7 +451,19 @@ def test_the_outer_axis_moves_continuously_over_the_pole():
     assert np.abs(outer).max() == pytest.approx(3.0, abs=0.01)
 
 
-@pytest.mark.parametrize(("first", "last"), [(0.5, 12.0), (3.0, 30.0), (-4.0, 9.0), (20.0, 2.0), (5.0, 5.0)])
+@pytest.mark.parametrize(
+    ("first", "last"),
+    [
+        (0.5, 12.0),
+        (3.0, 30.0),
+        (-4.0, 9.0),
+        (20.0, 2.0),
+        (5.0, 5.0),
+        (183.0, 195.0),
+        (171.0, 184.0),
+        (-171.0, -184.0),
+    ],
+)
 def test_the_shortest_of_many_segments_is_known(first, last):
     """They are even in u = asinh(lean / POLE); the shortest lies where the axes are nearest to their pole."""
     text = f"G43.4 H1\nG1 X0. Y0. Z0. B{first} C0. F1000\nG1 X100. B{last} C40.\n"
@@ -465,3 +477,19 @@ def test_the_shortest_of_many_segments_is_known(first, last):
     smallest = float(np.diff(shares).min()) * count
     assert shortest(path, row, low, high)[0] == pytest.approx(min(1.0, smallest), rel=2e-3)
     assert (smallest < 0.99) == (first != last)
+
+
+@pytest.mark.parametrize(("first", "last"), [(3.0, 15.0), (-9.0, 4.0), (0.5, 12.0)])
+@pytest.mark.parametrize("turn", [180.0, -180.0])
+def test_the_pole_half_a_turn_on_is_a_pole_too(first, last, turn):
+    """Half a turn of the leaning axis lays the tool along the outer axis again: segments are as short as there."""
+
+    def segments(more):
+        text = f"G43.4 H1\nG1 X0. Y0. Z0. B{first + more} C0. F1000\nG1 X100. B{last + more} C40.\n"
+        path = body(text, "fanuc").toolpath
+        row, part = np.array([len(path) - 1]), np.linspace(0.0, 1.0, 21)
+        many = np.repeat(row, len(part))
+        shares = shares_between(path, many, 0.0 * part, 0.0 * part + 1.0, part)
+        return [*shares, *shortest(path, row, np.zeros(1), np.ones(1))]
+
+    np.testing.assert_allclose(segments(turn), segments(0.0), atol=1e-9)

@@ -89,6 +89,18 @@ def test_compliances_and_weights_that_are_as_stated_stay():
     assert len(found) < len(moved(model, every)) / 4
 
 
+def test_what_all_together_leave_undetermined_does_not_come_in_by_holding_others():
+    """Weights of neighbouring links trade off: with one of them taken as stated the other would look well determined,
+    beside an interval that knows nothing of that."""
+    model, every, _ = fitted({"link_gravity.mx2": 390.0, "joint_compliance.c2": 3e-7}, weights=True)
+    left = {u.key for u in every.asked} - {u.key for u in every.unknowns}
+    assert {model.terms[term].effect.name for term, _ in left} >= {"link_gravity"}
+    found = restore_unmoved_parameters(every)
+    assert found is not every
+    assert {u.key for u in found.unknowns} <= {u.key for u in every.unknowns}
+    assert all(found.model.terms[t].values[p] == model.terms[t].values[p] for t, p in left)
+
+
 @pytest.mark.parametrize("clusters", [8, 15, 200])
 def test_chance_of_readings_that_share_errors_is_that_of_few_poses(clusters):
     """The share of draws in which readings of one pose, whose error is estimated from as many, explain as much."""

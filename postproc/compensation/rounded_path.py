@@ -41,9 +41,6 @@ NEAR = np.array([0.8, 1.6, 2.5, 3.5, 5.0, 8.0]) * MM
 CLOSER, AROUND = 2, np.linspace(-1.0, 1.0, 7)
 """How often, and where, it is evaluated closer to its largest error."""
 
-PEAKS = 1
-"""Peaks around which it is."""
-
 TURNINGS, AT_TURN = 12, 5e-8
 """Steps at most to the place where the force turns, and [m] how near to it one is the last."""
 
@@ -144,9 +141,9 @@ class RoundedOutput:
 
     def peaks(self, at: Ints, share: Floats, closer: int = CLOSER) -> tuple[Floats, Floats]:
         """(K,) [m] and (K,) [rad]: by how much the tool is off at most at the shares (K, S) of the segments ``at``
-        (K, S), in the order of the path, ``closer`` times nearer around the ``PEAKS`` largest of its peaks, and at
-        the ``turns`` of the force."""
-        many, count = share.shape
+        (K, S), in the order of the path, ``closer`` times nearer around the largest of them, and at the ``turns`` of
+        the force."""
+        many = len(share)
         off, angle = np.zeros(many), np.zeros(many)
         gap = np.where(np.diff(at, axis=1) == 0, np.diff(share, axis=1), 0.0)
         edge = np.zeros((many, 1))
@@ -154,24 +151,18 @@ class RoundedOutput:
         for level in range(closer + 1):
             found = self.deviations(at.ravel(), share.ravel())
             here, turned = (lengths(part).reshape(at.shape) for part in (found.shift, found.turn))
-            off = np.maximum(off, here.reshape(many, -1).max(axis=1))
-            angle = np.maximum(angle, turned.reshape(many, -1).max(axis=1))
+            off = np.maximum(off, here.max(axis=1))
+            angle = np.maximum(angle, turned.max(axis=1))
             if level == closer:
                 break
             if level == 0:
                 for which, _, _, there in self.where_force_turns(at, share, found):
                     np.maximum.at(off, which, lengths(there.shift))
                     np.maximum.at(angle, which, lengths(there.turn))
-            if level == 0:
-                padded = np.pad(here, ((0, 0), (1, 1)), constant_values=-1.0)
-                top = (here >= padded[:, :-2]) & (here >= padded[:, 2:])
-                peak = np.argsort(np.where(top, -here, 0.0), axis=1, kind="stable")[:, : min(PEAKS, count)]
-            else:  # of each peak the largest of the places around it
-                rows = here.reshape(many, -1, len(AROUND)).argmax(axis=2)
-                peak = rows + len(AROUND) * np.arange(rows.shape[1])
+            peak = here.argmax(axis=1)[:, None]
             centre, width = np.take_along_axis(share, peak, 1), np.take_along_axis(width, peak, 1)
             at = np.repeat(np.take_along_axis(at, peak, 1), len(AROUND), axis=1)
-            share = np.clip(centre[:, :, None] + width[:, :, None] * AROUND, 0.0, 1.0).reshape(many, -1)
+            share = np.clip(centre + width * AROUND, 0.0, 1.0)
             width = np.repeat(width * (AROUND[1] - AROUND[0]), len(AROUND), axis=1)
         return off, angle
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.base.arrays import Floats, Ints
+from postproc.base.arrays import Floats
 from postproc.base.findings import Finding
 from postproc.diagnosis.candidates import candidates
 from postproc.diagnosis.diagnosis import Diagnosis, diagnose
@@ -18,6 +18,7 @@ from postproc.diagnosis.search_result import Search
 from postproc.diagnosis.selection import basis_of, outside
 from postproc.diagnosis.verdict import AS_WELL, OTHER_COURSE
 from postproc.identification.campaign import Campaign
+from postproc.identification.joint_scatter import visits_of
 from postproc.model import StiffnessModel
 
 SOUND = ("nothing_missing", "named")
@@ -43,18 +44,18 @@ def diagnose_sides(
     """The diagnosis, and what was assumed of the sides of approach where the columns DIR do not state them.
 
     They are unknown first: every gear lies in the middle of its gap, or where its load puts it.  Where that leaves
-    something, the order of the rows is tried, then sides by the residuals of one joint, each at the price of a bit for
-    every visit of a pose; these only where an effect of approach then explains all of it.
+    something that effects of approach may explain, however much scatter may be like it (readings of a pose share the
+    side of its approach, as they share an error), the order of the rows is tried.  Where more than scatter is left,
+    then sides by the residuals of one joint, each at the price of a bit for every visit of a pose; these only where an
+    effect of approach then explains all of it.
     """
     readings = campaign.readings
     if readings.direction is not None:
         return diagnose(campaign, model, stage), ()
     unknown = Campaign(replace(readings, direction=np.zeros_like(readings.q)), campaign.stated_tool)
     done = diagnose(unknown, model, stage)
-    if done.verdict.word in SOUND and not done.verdict.conditional:
-        return done, ()
-    stage("trying sides of approach")
     if may_explain(campaign, done):
+        stage("trying sides of approach")
         other = diagnose(campaign, model, goes_on=by_approach)
         if _is_better(other, done):
             return other, (_finding(readings.where(0)[0], "they are taken from the order of the rows"),)
@@ -138,7 +139,7 @@ def _shown(done: Diagnosis) -> list[tuple[int, Floats]]:
     above = -1.0 if fitted.campaign.readings.deflection and gaps else 1.0
     campaign = fitted.campaign
     weight = fitted.plain_weights.weight[:, :3] ** 2
-    visit = _visits(campaign.pose)
+    visit = visits_of(campaign.pose)
     residual = np.nan_to_num(fitted.point.residual[:, :3])
     names = [joint.name for joint in fitted.model.robot.joints]
     squares, coordinates = float((weight * residual**2).sum()), int((weight > 0).sum())
@@ -156,8 +157,3 @@ def _shown(done: Diagnosis) -> list[tuple[int, Floats]]:
             entries.append((gain, names.index(variable.split(" over ")[0]), -above * np.sign(along)[visit]))
     entries.sort(key=lambda entry: -entry[0])
     return [(joint, sides) for gain, joint, sides in entries[:JOINTS] if gain > 0]
-
-
-def _visits(pose: Ints) -> Ints:
-    """(R,) number of the visit of each reading: rows of one pose after each other are one."""
-    return np.asarray(np.cumsum(np.append(0, np.diff(pose) != 0)))

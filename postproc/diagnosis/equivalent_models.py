@@ -8,6 +8,8 @@ values that are reported.  The mean square error of these is then
 
     E (x - reported)(x - reported)^T = covariance of x in the posterior + d d^T
 
+The readings scatter there as joints do not come to rest at one angle either (``identification.joint_scatter``).
+
 Considered parameters: Schmidt, Adv. Control Systems 3 (1966), 293; posterior mean square error of any estimate: Berger,
 Statistical Decision Theory and Bayesian Analysis (1985), Sec. 4.3.
 """
@@ -27,6 +29,7 @@ from postproc.diagnosis.selection import basis_of, outside
 from postproc.effects.joint_offset import JointOffset
 from postproc.effects.link_geometry import LinkGeometry
 from postproc.identification.fit import Fit
+from postproc.identification.joint_scatter import scatter_of
 from postproc.identification.least_squares import predicted_in, prior_rows, prior_weight, scales
 from postproc.identification.sensitivities import columns
 from postproc.identification.unknowns import Unknown, unknowns_of, with_gauge
@@ -134,6 +137,11 @@ def _posterior(full: Fit, model: StiffnessModel, others: Mapping[Unknown, bool])
     on = s > ROUNDING * s[0]
     back = (v[on].T / s[on])[:k] / length[:k, None]
     unit = scales(own)
-    covariance = back @ back.T * full.factor * np.outer(unit, unit)
+    covariance = back @ back.T * full.factor
+    scatter = scatter_of(full)
+    if scatter is not None:
+        count = len(whole) - len(rows)
+        covariance += scatter.excess(back @ u[:count, on].T)
+    covariance *= np.outer(unit, unit)
     mean = point.values(own) + (back @ (u[:, on].T @ target)) * unit
     return np.asarray(covariance), np.asarray(mean)

@@ -44,13 +44,16 @@ def restore_unmoved_parameters(fitted: Fit) -> Fit:
     if len(chosen) == len(own) or not new <= {(own[k].term, own[k].parameter.joint) for k in chosen}:
         return fitted
     gone = {own[k].key: _before(own[k]) for k in range(len(own)) if k not in chosen}
-    rest = [u for u in fitted.asked if u.key not in gone]
+    # what all of these together leave undetermined is not determined by taking others as stated
+    rest = [u for u in fitted.unknowns if u.key not in gone]
     model = fitted.model.with_values(gone)
     found = fit(fitted.campaign, model, rest, nuisances=fitted.point.nuisances, factor=fitted.factor)
     worse = (_squares(found, fitted) - _squares(fitted, fitted)) / max(fitted.factor, 1e-300)
     if worse > chdtri(len(gone), TOGETHER):
         return fitted
-    return replace(found, covariance=_covariance(found, fitted))
+    asked = tuple(u for u in fitted.asked if u.key not in gone)
+    dropped = (*fitted.dropped, *found.dropped)
+    return replace(found, asked=asked, dropped=dropped, covariance=_covariance(found, fitted))
 
 
 def _covariance(refitted: Fit, fitted: Fit) -> Floats:

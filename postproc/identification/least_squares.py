@@ -201,14 +201,13 @@ def descended(
     max_steps: int = MAX_STEPS,
     factor: float = 1.0,
     close: float = CLOSE,
-    second_order: bool = True,
 ) -> Point:
     """The least squares of ``weights(residual)`` and the priors, from ``point``.
 
     ``keep_columns``: those of ``point`` serve all through, for fits that end close by.  ``factor``: variance of the
-    readings over the one of ``weights``; priors count the more against it.  Each linear problem is solved
-    within the bounds; steps are halved until the squares fall; with ``second_order`` what one was not foreseen to do is
-    undone first.  ``close``: step that is the last, in standard deviations of a reading.
+    readings over the one of ``weights``; priors count the more against it.  Each linear problem is solved within the
+    bounds; steps are halved until the squares fall.  ``close``: step that is the last, in standard deviations of a
+    reading.
     """
     scale = scales(unknowns)
 
@@ -244,16 +243,6 @@ def descended(
         for _ in range(1 if ending else 12):
             moved = _stepped(campaign, point, unknowns, share * whole, scale)
             after, gone = residuals(moved)
-            foreseen = matrix @ (share * whole)
-            bent = residual - foreseen - after
-            if second_order and not ending and np.linalg.norm(bent) > CURVED * np.linalg.norm(foreseen):
-                # along a curved valley: what was not foreseen is undone with the same columns (second order)
-                within = reach(campaign, moved, unknowns)
-                undone = linear.step(-bent, within, len(scale), careful)
-                other = _stepped(campaign, moved, unknowns, undone, scale)
-                its, lacks = residuals(other)
-                if lacks <= gone and its @ its < after @ after:
-                    moved, after, gone = other, its, lacks
             if gone <= lost and after @ after <= residual @ residual * (1 + 1e-12):
                 break
             share *= 0.5

@@ -59,7 +59,6 @@ def held_out(fitted: Fit, folds: int, progress: Progress = nothing) -> Floats:
             weights = fitted.weights.times((~rows).astype(float))
             point = descended(
                 campaign, fitted.point, fitted.unknowns, weights, True, factor=fitted.factor, close=NEAR,
-                second_order=False,
             )  # fmt: skip
             residuals[rows] = campaign.in_base(point.residual, point.nuisances)[rows, :3]
             progress(k + 1, folds)

@@ -16,6 +16,7 @@ from postproc.base.units import DEG, MM
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
 from postproc.identification.identifiable import strong_correlations
+from postproc.identification.joint_scatter import with_scatter_of_joints
 from postproc.identification.mounting import check_mounting
 from postproc.identification.other_arm import check_arm
 from postproc.identification.outliers import Outlier, outliers
@@ -106,6 +107,7 @@ def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress
         after = fit(campaign, asked.model, asked.unknowns, rows, request.robust, nuisances=given)
     if not after.unknowns:
         raise Refusal(_no_parameter_identified(measured, after))
+    after = with_scatter_of_joints(after)
     folds = min(request.folds, campaign.poses)
     residuals: list[Floats | None] = [None, None]
     if folds > 1:

@@ -29,7 +29,8 @@ def judged(run: Run, answer: dict, found: StiffnessModel | None = None, with_gap
     ``found``: the model of the robot file that was written.
 
     outcome: exact; ambiguous (with the truth, where an oracle can not tell it from something else), undecided (the
-    same where it can); partly (some of the truth and no more), missed, unknown, wrong, refused.
+    same where it can); unseen (nothing is said of what an oracle can not tell from nothing, and all else is right);
+    partly (some of the truth and no more), missed, unknown, wrong, refused.
     """
     rest = run.readings.value - run.without
     rivals = [nearest(run, k, rest) for k in range(len(run.hidden))]
@@ -76,11 +77,21 @@ def outcome_of(run: Run, answer: dict, rivals: list[list[Rival]]) -> str:
     sets = [one for one in sets if len(one) > 1]
     outside = any(h.outside for h, _ in run.hidden)
     truth = truth_of(run) - (of_own_geometry(run, answer) - names.union(*sets))
-    if truth != truth_of(run):
-        rivals = [
-            of for (h, _), of in zip(run.hidden, rivals, strict=True) if named(h.effect, h.joint) in truth
-        ]
-    return outcome_of_words(answer["verdict"], truth, names, sets, outside, rivals)
+    of_truth = {named(h.effect, h.joint): of for (h, _), of in zip(run.hidden, rivals, strict=True)}
+    of_truth = {one: of for one, of in of_truth.items() if one in truth}
+    # what nobody who knows it would see beside the rest may be left out, and may be named
+    unseen = {one for one, of in of_truth.items() if is_unseen(of)}
+    gone = unseen - names.union(*sets)
+    if answer["verdict"] not in ("named", "partly_named", "ambiguous") or not truth - gone:
+        gone = set()
+    apart = [of for one, of in of_truth.items() if one not in gone]
+    outcome = outcome_of_words(answer["verdict"], truth - gone, names, sets, outside, apart)
+    return "unseen" if gone and outcome == "exact" else outcome
+
+
+def is_unseen(rivals: list[Rival]) -> bool:
+    """Whether an oracle that has these ``rivals`` of an effect could not tell it from nothing."""
+    return any(rival.effect == "nothing" and rival.margin < MARGIN for rival in rivals)
 
 
 def of_own_geometry(run: Run, answer: dict) -> set[tuple[str, str]]:
@@ -117,7 +128,7 @@ def outcome_of_words(
     word: str, truth: set, names: set, sets: list[set], outside: bool, rivals: list[list[Rival]]
 ) -> str:
     apart = all(of and of[0].margin >= MARGIN for of in rivals if of)
-    unseen = any(r.effect == "nothing" and r.margin < MARGIN for of in rivals for r in of)
+    unseen = any(is_unseen(of) for of in rivals)
     if word in ("refused", "crashed", "unknown"):
         return word
     if word == "nothing_missing":

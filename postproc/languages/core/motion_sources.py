@@ -32,14 +32,15 @@ Source = int | Meeting
 
 def met(own: frozenset[Source], other: frozenset[Source], meeting: Meeting) -> frozenset[Source]:
     """The sources where paths with these meet; ``own`` itself where the other path adds nothing.  meeting: that of
-    the place, which takes them up from ``MOST`` on."""
+    the place, which takes them up from ``MOST`` on, and all that come later: a loop would else distinguish one more of
+    them each time."""
     if other <= own:
         return own
     if meeting in own:
         meeting.sources |= other
         return own
     both = own | other
-    if len(both) <= MOST:
+    if len(both) <= MOST and not meeting.sources:
         return both
     meeting.sources |= both
     return frozenset([meeting])

@@ -16,14 +16,20 @@ _EMPTY: tuple[Any, ...] = (None,) * WIDTH
 
 Merge = Callable[[Any, Any, Any], Any]
 """The value of a key from its values in two maps, None where one has none."""
+_Node = tuple[Any, ...]
+_Merges = dict[tuple[int, int, int], tuple[_Node, _Node, _Node]]
+"""Numbers of the first key of two nodes, and of these -> both, and what they were merged to."""
+MOST_MERGES = 50_000
+"""Merges of nodes that are remembered."""
 
 
 class KeyNumbers:
-    """The numbers of the keys that maps of one program share."""
+    """The numbers of the keys that maps of one program share, and what was merged of these maps."""
 
     def __init__(self) -> None:
         self.numbers: dict[Hashable, int] = {}
         self.keys: list[Any] = []
+        self.merges: dict[Merge, _Merges] = {}
 
     def of(self, key: Hashable) -> int:
         number = self.numbers.get(key)
@@ -67,14 +73,21 @@ class PersistentMap:
         for number, value in _walk(self.root, self.depth, 0):
             yield self.numbers.keys[number], value
 
-    def merged(self, other: PersistentMap, merge: Merge) -> PersistentMap:
+    def merged(self, other: PersistentMap, merge: Merge, remembered: bool = False) -> PersistentMap:
         """The map of ``merge(key, own value, value in other)`` for all keys whose values are not the same object; the
-        map itself where that changes nothing."""
+        map itself where that changes nothing.
+
+        remembered: ``merge`` is a function of its arguments alone, and is asked once of what these versions and others
+        share: merging along a program then costs what changes between its places, not what differs at each.
+        """
         if self.root is other.root:
             return self
         depth = max(self.depth, other.depth)
         own, others = (m._deepened(depth) for m in (self, other))
-        root = _merged(own.root, others.root, depth, 0, self.numbers.keys, merge)
+        known = self.numbers.merges.setdefault(merge, {}) if remembered else None
+        root = _merged(own.root, others.root, depth, 0, self.numbers.keys, merge, known)
+        if root is others.root:
+            return others
         return self if root is own.root else PersistentMap(self.numbers, root, depth)
 
     def common(self, other: PersistentMap) -> PersistentMap:
@@ -115,22 +128,31 @@ def _walk(node: tuple[Any, ...], depth: int, base: int) -> Iterator[tuple[int, A
 
 
 def _merged(
-    own: tuple[Any, ...], other: tuple[Any, ...], depth: int, base: int, keys: list[Any], merge: Merge
-) -> tuple[Any, ...]:
-    merged, changed = list(own), False
+    own: tuple[Any, ...], other: tuple[Any, ...], depth: int, base: int, keys: list[Any], merge: Merge,
+    known: _Merges | None,
+) -> tuple[Any, ...]:  # fmt: skip
+    place = base, id(own), id(other)
+    if known is not None and place in known:
+        return known[place][2]
+    merged, is_own, is_other = list(own), True, True
     for at, (one, two) in enumerate(zip(own, other, strict=True)):
         if one is two:
             continue
         if depth:
-            new = _merged(one or _EMPTY, two or _EMPTY, depth - 1, (base + at) * WIDTH, keys, merge)
-            if new is (one or _EMPTY):
-                continue
+            mine, others = one or _EMPTY, two or _EMPTY
+            new = _merged(mine, others, depth - 1, (base + at) * WIDTH, keys, merge, known)
+            is_own, is_other = is_own and new is mine, is_other and new is others
+            new = one if new is mine else new
         else:
             new = merge(keys[base + at], one, two)
-            if new is one:
-                continue
-        merged[at], changed = new, True
-    return tuple(merged) if changed else own
+            is_own, is_other = is_own and new is one, is_other and new is two
+        merged[at] = new
+    found = own if is_own else other if is_other else tuple(merged)
+    if known is not None:
+        if len(known) >= MOST_MERGES:
+            known.clear()
+        known[place] = own, other, found
+    return found
 
 
 def _common(own: tuple[Any, ...], other: tuple[Any, ...], depth: int) -> tuple[Any, ...]:

@@ -181,6 +181,8 @@ _TOKENS = {
         r"|(?P<sign>==|<>|>=|<=|[-+*/()\[\],<>])|(?P<blank>[ \t]++)"
     ),
 }
+EXPRESSIONS = 1 << 16
+"""Texts of which the tokens are remembered: fewer than a loop has, and none of them would be found in its next pass."""
 _BLANKS = str.maketrans("", "", " \t\x0b\x0c")
 
 
@@ -198,7 +200,7 @@ def evaluate(text: str, language: ExpressionLanguage, lookup: Lookup) -> float:
     return value if end == len(tokens) and math.isfinite(value) else math.nan
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=EXPRESSIONS)
 def _tokens(text: str, numbered: bool) -> tuple[tuple[str, str], ...]:
     """Kind and text of every token; none where a part of the text is no token.  The same text comes again in each pass
     of a loop."""

@@ -41,6 +41,7 @@ _CLOSING = frozenset(
     b"ENDPROC ENDFUNC ENDTRAP ENDIF ELSE ELSEIF ENDFOR ENDWHILE ENDTEST CASE DEFAULT ENDMODULE".split()
 )
 _OUTER = frozenset(b"PROC FUNC TRAP ENDPROC ENDFUNC ENDTRAP ENDMODULE LOCAL TASK".split()) | _HANDLERS
+_ENDS_STATEMENTS = _OUTER | _CLOSING
 _RESERVED = _CLOSING | frozenset(b"THEN DO FROM TO STEP WITH ENDRECORD MODULE RECORD ALIAS".split())
 NOWHERE_ELSE = NamesElsewhere()
 DEEPEST = 60
@@ -209,6 +210,8 @@ class ModuleParser(RapidExpressionParser):
             found += self._drain(start)
             if self.next.kind == END or word in _CLOSING or word in _OUTER:
                 return found
+            if self.sign(b";"):  # a statement of nothing
+                continue
             at = len(found)
             try:
                 found.append(self._common(self._statement(word, depth)))
@@ -391,22 +394,9 @@ class ModuleParser(RapidExpressionParser):
     def _skip(self, start: int = -1) -> NotUnderstood:
         """Passes a statement that is not understood, to its semicolon or to where a block opens or ends."""
         start = self.next.start if start < 0 else start
-        first = True
-        while self.next.kind != END:
-            word = self._word()
-            if not first and (word in _OUTER or word in _CLOSING):
-                break
-            first = False
-            if self.take().text == b";":
-                break
+        names = self.tokens.skip(start, _ENDS_STATEMENTS)
         stop = self.tokens.before
-        names = set()
-        tokens = Tokens(self.raw[start:stop])
-        word = tokens.next.text.upper()
-        while tokens.next.kind != END:
-            token = tokens.take()
-            if token.kind == NAME:
-                names.add(token.text)
+        word = Tokens(self.raw[start:stop]).next.text.upper()
         return NotUnderstood(frozenset(names), word, start, stop)
 
     def _drain(self, stop: int) -> list[Remark]:

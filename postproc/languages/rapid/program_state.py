@@ -53,6 +53,11 @@ class ProgramState:
     def put(self, name: bytes, value: Value) -> None:
         self.values = self.values.set(name, value)
 
+    def forget_own(self, routine: bytes) -> None:
+        """Takes out the data of a routine that does not outlive it."""
+        for name in [name for name, _ in self.values.items() if name.startswith(routine + b"/")]:
+            self.values = self.values.set(name, None)
+
     def is_same(self, other: ProgramState) -> bool:
         """Whether the same holds in both."""
         apart = self.last == other.last and _JOINS.values(self) == _JOINS.values(other)
@@ -62,7 +67,8 @@ class ProgramState:
         """Takes in what holds where another path meets this one, at the place of ``meeting``; whether anything
         changed."""
         changed = _JOINS.changes(self, other)
-        values, last = self.values.merged(other.values, _of_paths), met(self.last, other.last, meeting)
+        values = self.values.merged(other.values, _of_paths, remembered=True)
+        last = met(self.last, other.last, meeting)
         if not changed and values is self.values and last == self.last:
             return False
         self.values, self.last = values, last
@@ -89,10 +95,12 @@ _JOINS = FieldJoins(
 
 def _of_paths(name: bytes, one: Value | None, other: Value | None) -> Value:
     """The value of a variable where two paths meet."""
+    if isinstance(one, UnknownData) and one == other:
+        return one
     shown = name.rpartition(b"/")[2].decode("latin-1")
     reason = f"{shown} has different values on several paths of the program"
     new = UnknownData(reason) if one is None or other is None else joined(one, other, reason)
-    return one if one is not None and new == one else new
+    return one if one is not None and new == one else other if other is not None and new == other else new
 
 
 def same_values(one: PersistentMap, other: PersistentMap) -> bool:

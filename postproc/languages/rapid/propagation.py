@@ -160,7 +160,9 @@ class Propagation:
             after = self._routine(main, state.copy(), False)
             again = state.copy()
             if after is not None:
-                self._leave_early(main, after)
+                if main.handlers:  # an error may end it in the middle
+                    self._lose_effects(main.name, after)
+                after.forget_own(main.name)
                 again.join(after, Meeting())
             again.last, again.waits = state.last, state.waits
             again.force, again.switch = state.force, state.switch
@@ -169,11 +171,6 @@ class Propagation:
             state.take(again)
         self._forget_all(self.usage.assigned, state)
         changes._replace(speaks=False).lose(state, b"an earlier run")
-
-    def _leave_early(self, routine: RapidRoutine, state: ProgramState) -> None:
-        """What is not known after a routine that an error may end in the middle."""
-        if routine.handlers:
-            self._lose_effects(routine.name, state)
 
     def _lose_effects(self, name: bytes, state: ProgramState) -> None:
         """What calls of a routine may have done, or a part of it."""
@@ -436,13 +433,14 @@ class Propagation:
         key, shown = self._names.key(variable), variable.decode("latin-1")
         if key == variable and (variable not in self.data or self.data.is_constant(variable)):
             return
-        old, kind = self._names.look(variable, state)
-        if isinstance(old, UnknownData) and is_component(target):
-            old = unknown_record(kind, evaluator.components, old)
         if isinstance(value, UnknownData) and NOT_CONSTANT not in value.reason:
             value = UnknownData(f"{shown}{NOT_CONSTANT}{value.reason}")
-        changed = replaced(old, place, value, f"a part of {shown} is assigned that is not known")
-        state.put(key, changed)
+        if place:
+            old, kind = self._names.look(variable, state)
+            if isinstance(old, UnknownData) and is_component(target):
+                old = unknown_record(kind, evaluator.components, old)
+            value = replaced(old, place, value, f"a part of {shown} is assigned that is not known")
+        state.put(key, value)
 
     def _evaluator(self, state: ProgramState) -> Evaluator:
         return Evaluator(

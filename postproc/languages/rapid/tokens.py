@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Set
 from typing import NamedTuple
 
 _TOKEN = re.compile(
@@ -59,6 +60,30 @@ class Tokens:
                 return Token(kind, found[kind], found.start(kind), at)
             self.comments.append(found.span(kind))
         return Token(END, b"", at, at)
+
+    def skip(self, start: int, words: Set[bytes]) -> set[bytes]:
+        """Passes tokens to the semicolon that comes, or to before a name that is one of ``words``, at least one; gives
+        the names from ``start`` on."""
+        raw, first, match = self.raw, self.next.start, _TOKEN.match
+        names: set[bytes] = set()
+        at, stop = start, self.before
+        while (found := match(raw, at)) and found.lastgroup != END:
+            kind, after = found.lastgroup, found.end()
+            if kind == _COMMENT:
+                if after > first:  # it was not passed yet
+                    self.comments.append(found.span(kind))
+            else:
+                if kind == NAME:
+                    name = found[kind].upper()
+                    if found.start(kind) > first and name in words:
+                        break
+                    names.add(name)
+                stop = after
+                if kind == SIGN and after > first and raw[after - 1 : after] == b";":
+                    break
+            at = after
+        self.before, self.next = stop, self._at(stop)
+        return names
 
     def jump(self, at: int) -> None:
         """Goes on at a later byte, with no comment between."""
