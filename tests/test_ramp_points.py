@@ -270,6 +270,21 @@ def test_errors_are_found_where_the_force_turns(second: float) -> None:
             assert most == pytest.approx(true, rel=0.03, abs=1e-7)
 
 
+@pytest.mark.parametrize(("nearly", "inserted"), [(1.08, 22), (1.0, 24)])
+def test_what_few_points_nearly_hold_gets_no_more(
+    nearly: float, inserted: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two corners of the taught program: 0.0191 mm with two points by the first fit, 0.0187 by the close one, of 0.0189
+    that are allowed."""
+    monkeypatch.setattr("postproc.compensation.ramp_points.NEARLY", nearly)
+    taught = Path(__file__).parents[1] / "samples" / "kr270_taught" / "taught.src"
+    task = prepare(Request(taught, force="")).task
+    result, limits = correct(task), Limits(cycle=0.012, ramp_end=0.3e-3, least=200)
+    fit, division = fit_corners(task, result, subdivide(task, result, limits), limits)
+    assert division.inserted == inserted
+    assert rounded_errors(task, fit, division)[1].max() < task.tolerance
+
+
 def test_the_force_turns_where_motions_start_too() -> None:
     """Where no ramp is: within each motion it changes evenly, at another rate than in the next."""
     job = square(0.5 * MM)

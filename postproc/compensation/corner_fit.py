@@ -35,7 +35,7 @@ ROUNDS, WEIGHINGS = 4, 24
 ALLOWED = 0.9
 """Share of the tolerance that a corner may take: the path is evaluated as it is run, and digits take little."""
 
-ON_RAMPS, FITTED = 0.97, 0.92
+ON_RAMPS, FITTED = 0.97, 0.945
 """The same on ramps of the force, where a smaller share takes more points (of more than the tolerance, once written,
 further ones), and with which their points are fitted to a curve, which is a little simpler than the path."""
 

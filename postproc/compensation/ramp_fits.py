@@ -188,25 +188,35 @@ class CloseFits:
     """Close fits of ramps, which take their time: each is done once, however often the others change."""
 
     def __init__(self) -> None:
-        self._known: dict[tuple[int, bytes], FittedPoints | None] = {}
+        self._known: dict[tuple[str, int, bytes], FittedPoints | None] = {}
 
     def fit(self, ramp: FittedRamps, curve: Curves, number: int, allowed: float) -> FittedPoints | None:
         """The points of one ramp, approximated at its vertex, from the start ``number`` on, until they are within
         ``allowed`` [m]; None where they have no room."""
-        key = number, curve.place.tobytes()
+        key = "start", number, curve.place.tobytes()
         if key not in self._known:
-            self._known[key] = _closely_fitted(ramp, curve, *CLOSE_STARTS[number], allowed)
+            words, spare = CLOSE_STARTS[number]
+            start, own = _apart(ramp, curve, words, None, spare), words.index((_V, 0.0))
+            self._known[key] = _closely_fitted(ramp, curve, start, own, allowed)
         return self._known[key]
+
+    def go_on(self, ramp: FittedRamps, curve: Curves, points: FittedPoints, allowed: float) -> FittedPoints:
+        """The points of one ramp, approximated at its vertex, from ``points`` on, or these where none come nearer."""
+        key = "points", len(points.along), curve.place.tobytes()
+        if key not in self._known:
+            self._known[key] = _closely_fitted(ramp, curve, points.along[None], points.own, allowed)
+        found = self._known[key]
+        return points if found is None or found.largest >= points.largest else found
 
 
 def _closely_fitted(
-    ramp: FittedRamps, curve: Curves, words: Words, spare: float, allowed: float
+    ramp: FittedRamps, curve: Curves, start: Floats, own: int, allowed: float
 ) -> FittedPoints | None:
-    start, place = _apart(ramp, curve, words, None, spare), words.index((_V, 0.0))
-    parameter, reach, shortest, vertex = _polygons(ramp, curve, start, place, exact=False)
+    """From ``start`` (1, n) [m] on, of which ``own`` is the motion that is there already."""
+    parameter, reach, shortest, vertex = _polygons(ramp, curve, start, own, exact=False)
     if (np.diff(parameter) <= 0.0).any():
         return None
     points, largest = closest_points(curve, parameter, reach, shortest, CLOSE_ENOUGH * allowed, vertex)
     if not np.isfinite(largest):
         return None
-    return FittedPoints(points[0, 1:-1], curve.nearest(points, parameter)[0, 1:-1], place, largest)
+    return FittedPoints(points[0, 1:-1], curve.nearest(points, parameter)[0, 1:-1], own, largest)

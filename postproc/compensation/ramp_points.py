@@ -62,7 +62,10 @@ PAYS_CLOSE = 0.97
 """The same of a close fit."""
 
 SEARCHED = 8
-"""Ramps that no fit holds and that are fitted closely: the first of a program."""
+"""Ramps that no fit holds, and ramps that one nearly holds, that are fitted closely: the first of a program."""
+
+NEARLY = 1.08
+"""By this factor more than what is allowed remains at most of what is fitted closely before there are more points."""
 
 SHOWS = 0.9
 """Share of the tolerance: ramps whose ends are rounded off by less keep the one point that they have."""
@@ -92,10 +95,17 @@ def choose_ramp_points(
     spare = limits.inserted(len(task.toolpath)) - division.inserted
     found: dict[int, FittedPoints] = {}
     nearest: dict[int, FittedPoints] = {}
-    left = np.arange(len(ramps.row))
+    left, tried = np.arange(len(ramps.row)), set[int]()
     for count in range(1, len(STARTS) + 1):
         some = left[(fewest[left] <= count) & (count <= inner[left] + spare)]
         for name, one in fit_ramps(ramps[some], curves[some], count, allowed, some).items():
+            if (
+                allowed < one.largest <= NEARLY * allowed
+                and not ramps.exact[name]
+                and len(tried | {name}) <= SEARCHED
+            ):
+                this, tried = np.array([name]), tried | {name}
+                one = close.go_on(ramps[this], curves[this], one, allowed)
             if one.largest <= allowed:
                 found[name] = one
             elif name not in nearest or one.largest < PAYS * nearest[name].largest:

@@ -9,7 +9,7 @@ that is the quadratic Bezier curve with the end point as its control point.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.geometry import Poses, lengths
 from postproc.base.units import MM
 from postproc.compensation.approximations import approximations
+from postproc.compensation.brackets import Brackets
 from postproc.compensation.desired_path import interpolate_poses
 from postproc.compensation.gap_sides import GapSides
 from postproc.compensation.path_error import PathSegments
@@ -40,8 +41,8 @@ NEAR = np.array([0.8, 1.6, 2.5, 3.5, 5.0, 8.0]) * MM
 CLOSER, AROUND = 2, np.linspace(-1.0, 1.0, 7)
 """How often, and where, it is evaluated closer to its largest error."""
 
-TURNINGS = 3
-"""Steps to the place where the force turns."""
+TURNINGS, AT_TURN = 12, 5e-8
+"""Steps at most to the place where the force turns, and [m] how near to it one is the last."""
 
 NEAREST = 1e-12
 """[m] The extent of a motion that leads nowhere."""
@@ -56,6 +57,15 @@ class Deviations:
     share: Floats
     shift: Floats
     turn: Floats
+
+    @staticmethod
+    def empty(count: int) -> Deviations:
+        return Deviations(np.zeros(count, np.int64), np.zeros(count), *np.zeros((2, count, 3)))
+
+    def put(self, numbers: Ints, other: Deviations) -> None:
+        """Sets ``numbers`` (K,) to the K places of the other."""
+        for one in fields(self):
+            getattr(self, one.name)[numbers] = getattr(other, one.name)
 
 
 @dataclass(frozen=True)
@@ -196,21 +206,21 @@ class RoundedOutput:
             return
         turn = turns[np.minimum(passed[which, number], len(turns) - 1)]
         segment = at[which, number]
-        ends = [share[which, number + k] for k in (0, 1)]
-        away = [place[which, number + k] - turn for k in (0, 1)]
+        ends = (share[which, number + k] for k in (0, 1))
+        brackets = Brackets(*ends, *(place[which, number + k] - turn for k in (0, 1)))
+        between, there = np.empty(len(which)), Deviations.empty(len(which))
+        active = np.arange(len(which))
         for _ in range(TURNINGS):
-            between = ends[0] - away[0] * (ends[1] - ends[0]) / np.maximum(away[1] - away[0], NEAREST)
-            between = np.clip(between, *ends)
-            here = self.deviations(segment, between)
-            yield which, segment, between, here
-            gap = (
-                begins[np.clip(here.row - low, 0, len(length) - 1)]
-                + here.share * self.task.desired_path.length[here.row]
-                - turn
-            )
-            before = gap < 0
-            ends = [np.where(before, between, ends[0]), np.where(before, ends[1], between)]
-            away = [np.where(before, gap, away[0]), np.where(before, away[1], gap)]
+            between[active] = brackets.secants(active)
+            here = self.deviations(segment[active], between[active])
+            there.put(active, here)
+            yield which, segment, between, there
+            own = here.share * self.task.desired_path.length[here.row]
+            gap = begins[np.clip(here.row - low, 0, len(length) - 1)] + own - turn[active]
+            brackets.narrow(active, between[active], gap)
+            active = active[np.abs(gap) > AT_TURN]
+            if not len(active):
+                break
 
     def blend(self, at: Ints, share: Floats) -> Blend:
         """Where the shares (S,) of the segments ``at`` (S,) lie on parabolas."""

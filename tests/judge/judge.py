@@ -28,6 +28,9 @@ SAGITTA = 2e-7
 WORST, PARTS, ROUNDS = 6, 16, 2
 """Places with the largest errors beside which is sampled again, in so many parts of the way to the next samples, and
 how often."""
+PEAK, PEAKS = 2e-8, 8
+"""[m] The largest errors are sampled again until the largest grows by no more than this, so often at most: where the
+path turns the error has an edge, beside which it falls by as much as the tool goes on."""
 BACKWARDS = 2e-6
 PASSED = 8.0 * MM
 """[m] How far along the path a place may be passed beside where the tool belongs to it: where a tool leaps over a
@@ -233,6 +236,9 @@ def _along(wanted: Path, cut: tuple, path: Path, rows: tuple, one: Field, nodes:
             place = nearest_across_leaps(wanted, cut, one, label, place, at)
             label, place = divided(wanted, cut, one, label, place, at)
         tools, lost = at(label), np.isin(label, unsettled)
+    if path is not wanted:
+        label, place = _to_peaks(wanted, cut, one, label, place, at)
+        tools, lost = at(label), np.isin(label, unsettled)
     motion, _ = path.find(label, *rows)
     wrench = one.at(place)
     there, tilted, _ = tools.loaded(wrench)
@@ -262,6 +268,29 @@ def _along(wanted: Path, cut: tuple, path: Path, rows: tuple, one: Field, nodes:
         "unsettled": int(lost.sum()),
         "mujoco": agree,
     }
+
+
+def _to_peaks(
+    wanted: Path, cut: tuple, one: Field, label: np.ndarray, place: np.ndarray, tools_at: Callable
+) -> tuple[np.ndarray, np.ndarray]:
+    """Labels and places (S,), with samples beside the largest errors, ever closer, until the largest stays."""
+    distance = np.linalg.norm(tools_at(label).loaded(one.at(place))[0] - wanted.points(place, *cut), axis=1)
+    for _ in range(PEAKS):
+        more = np.setdiff1d(
+            np.union1d(_beside_worst(label, distance), _at_vertices(wanted, cut, label, place)), label
+        )
+        tools = tools_at(more)
+        found = beside_neighbours(wanted, cut, one, (label, place), more, tools)
+        good, largest = np.isfinite(found), distance.max()
+        found = np.where(good, found, place[0])
+        off = np.linalg.norm(tools.loaded(one.at(found))[0] - wanted.points(found, *cut), axis=1)
+        order = np.argsort(np.append(label, more[good]), kind="stable")
+        label, place, distance = (
+            np.append(old, new[good])[order] for old, new in ((label, more), (place, found), (distance, off))
+        )
+        if distance.max() <= largest + PEAK:
+            break
+    return label, place
 
 
 def _beside_worst(label: np.ndarray, distance: np.ndarray) -> np.ndarray:
