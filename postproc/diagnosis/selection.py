@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 
@@ -277,10 +278,31 @@ def _grown(
         least = _least(problem, tried)
         best = min(tried, key=lambda pair: _score(pair[0], least, penalty))[0]
         if not counts(problem, now, best, len(candidates)):
-            break
+            two = _two(problem, now, [g for _, g in tried], penalty)
+            if two is None:
+                break
+            best = two
         now = _exchanged(problem, best, others, penalty)
         now = _pruned(problem, now, len(candidates))
     return now
+
+
+def _two(problem: Problem, now: Explained, others: Sequence[int], penalty: float) -> Explained | None:
+    """``now`` with two of ``others`` where no single one counts, but more than scatter remains: each of two large
+    effects is scatter for the other.  None where no two count, among all pairs, or one of them does not beside the
+    other."""
+    if problem.known and scatter(problem, now) <= EXCEEDED:
+        return None
+    pairs = list(combinations(others, 2))
+    tried = [(explained(problem, (*now.groups, *pair)), 0) for pair in pairs]
+    if not tried:
+        return None
+    least = _least(problem, tried)
+    best = min((one for one, _ in tried), key=lambda one: _score(one, least, penalty))
+    if not counts(problem, now, best, len(pairs)):
+        return None
+    alone = [explained(problem, (*now.groups, g)) for g in best.groups[-2:]]
+    return best if all(counts(problem, one, best, len(others)) for one in alone) else None
 
 
 def _score(one: Explained, variance: float, penalty: float) -> float:
