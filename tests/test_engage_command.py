@@ -209,7 +209,7 @@ def test_a_holder_wider_than_its_clearance_has_its_line(folder):
         (
             STOCK + TOOLS.replace("shape: flat,", "shape: cone, angle: 1.05,"),  # rad
             "YML004",
-            ["the edges end at a diameter of 0.733", "below 16 mm"],
+            ["the diameter where the edges end is 0.733", "below 16 mm"],
             3,
         ),
     ],

@@ -14,7 +14,7 @@ from postproc.effects import EFFECTS
 from postproc.effects.joint_offset import JointOffset
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import fit
-from postproc.identification.joint_scatter import Part, Scatter, _moments, scatter_of, with_scatter_of_joints
+from postproc.identification.joint_scatter import Part, Scatter, moments, scatter_of, with_scatter_of_joints
 from postproc.identification.noise import Weighting
 from postproc.identification.sensitivities import columns
 from postproc.identification.unknowns import unknowns_of
@@ -49,7 +49,7 @@ def test_sizes_of_the_parts_come_out_whatever_a_fit_has_taken_out():
     for _ in range(300):
         z = drawn(rng, of, (0.3, 0.8))
         z -= q @ (q.T @ z)
-        found.append(np.linalg.solve(*_moments(of, q, z, len(z))))
+        found.append(np.linalg.solve(*moments(of, q, z, len(z))))
     scatter = np.std(found, axis=0) / np.sqrt(len(found))
     assert np.all(np.abs(np.mean(found, axis=0) - [1.0, 0.3, 0.8]) < 4.0 * scatter)
     assert np.all(scatter < 0.03)

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from judge.cases import CASES, CELL, CUT, OFF, Case, krl, lead_in, pose, run, steps_of_force
 from judge.cell import Cell
-from judge.drawn import drawn
 from judge.force import Field
 from judge.further_cases import FURTHER, against_the_force
 from judge.judge import judge
@@ -291,16 +290,6 @@ def test_verify_agrees_where_the_tool_may_be_at_two_places(tmp_path: Path) -> No
     program, output = tmp_path / "part.src", tmp_path / "compensated" / "part.src"
     by_force, _, _ = third(program, output, tmp_path / "cell.yaml")
     assert outcome.verdict.after.largest == pytest.approx(by_force, abs=2e-7)
-
-
-@pytest.mark.slow
-def test_verify_takes_no_farther_place_between_nearer_ones(tmp_path: Path) -> None:
-    """One command was placed 0.026 mm before the places of those before and after it: 0.0089 mm off instead of
-    0.0015."""
-    outcome = run(drawn(1254), tmp_path, verify=True)
-    assert outcome.exit == 0
-    assert outcome.verdict is not None
-    assert outcome.verify == pytest.approx(outcome.verdict.after.largest / MM, abs=1e-4)
 
 
 @pytest.mark.slow

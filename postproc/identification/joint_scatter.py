@@ -108,7 +108,7 @@ def scatter_of(fitted: Fit) -> Scatter | None:
     z = z - q @ (q.T @ z)
     if count <= q.shape[1] or not z.any() or parts[1].squares < UNMOVED * count:
         return None
-    means, squares = _moments(parts, q, z, count)
+    means, squares = moments(parts, q, z, count)
     unit = 1.0 / np.sqrt(np.diag(means))
     sizes = nnls(means * np.outer(unit, unit), squares * unit)[0] * unit
     assumed = fitted.factor * (count + weights.shared**2 * parts[0].squares)
@@ -160,10 +160,10 @@ def _joints(fitted: Fit) -> Floats:
     )
 
 
-def _moments(parts: Sequence[Part], q: Floats, z: Floats, count: int) -> tuple[Floats, Floats]:
-    """Matrix (1 + p, 1 + p) that gives the means of squares of what is left, ``z`` (n,), by itself and along each of
-    the p ``parts`` of its scatter, of the sizes of these, and the squares (1 + p,); ``q`` (n, k): what a fit has taken
-    out; ``count``: how many of n numbers count."""
+def moments(parts: Sequence[Part], q: Floats, z: Floats, count: int) -> tuple[Floats, Floats]:
+    """(M, M) matrix that gives the means of squares of what is left, ``z`` (n,), by itself and along each of the
+    ``parts`` of its scatter, M - 1 of them, of the sizes of these, and the squares (M,); ``q`` (n, k): what a fit has
+    taken out; ``count``: how many of n numbers count."""
     size = 1 + len(parts)
     means, squares = np.zeros((size, size)), np.zeros(size)
     means[0, 0], squares[0] = count - q.shape[1], z @ z

@@ -41,9 +41,9 @@ STEPS, HALVINGS = 10, 60
 SAME_GUESS = 1e-6
 """Parts of an interval by which two first places of a command differ by rounding alone."""
 
-LEAP, LEAST_LEAP, BACK, BESIDE, WALKS = 4.0, 0.05 * MM, 2e-6, 24, 40
-"""By how many times the step of the command, and how much [m], a place leaps on at least, or back; so many commands
-before and after it are tried on its other side, and so often at most, from where it leaps then."""
+LEAP, LEAST_LEAP, BESIDE, WALKS = 4.0, 0.05 * MM, 24, 40
+"""By how many times the step of the command, and how much [m], a place leaps at least; so many commands before and
+after it are tried on its other side, and so often at most, from where it leaps then."""
 
 STRIDES = (0.02, 0.03, 0.05, 0.1, 0.1, 0.2, 0.2, 0.3, 0.5, 1.0)
 """Parts of intervals in which a place is looked for beside another one."""
@@ -181,11 +181,10 @@ def _between_known(
 
 
 def _beside_leaps(placed: PlacedTool, stretch: Ints) -> Iterator[tuple[Ints, Floats]]:
-    """Commands (K,) before and after those at which the place leaps on or back, and the place (K,) on the other side of
-    the leap: of two places at which the path is square to the tool, the nearer one counts."""
-    step, gone = lengths(np.diff(placed.command, axis=0)), np.diff(placed.arc)
-    leap = (gone > LEAP * step + LEAST_LEAP) | (gone < -BACK)
-    leaps = np.flatnonzero(leap & (stretch[1:] == stretch[:-1]))
+    """Commands (K,) before and after those at which the place leaps on, and the place (K,) on the other side of the
+    leap: of two places at which the path is square to the tool, the nearer one counts."""
+    step = lengths(np.diff(placed.command, axis=0))
+    leaps = np.flatnonzero((np.diff(placed.arc) > LEAP * step + LEAST_LEAP) & (stretch[1:] == stretch[:-1]))
     for side in (0, 1):
         away = np.arange(BESIDE)
         beside = leaps[:, None] + (1 + away if side else -away)

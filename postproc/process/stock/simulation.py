@@ -254,14 +254,15 @@ def _summaries(run: StockRun, toolpath: Toolpath, path: Path) -> list[Finding]:
 def _collisions(cut: EngagedMotions, toolpath: Toolpath, program: str) -> list[Finding]:
     findings = []
     for row, parts in sorted(cut.hits.items())[:_MOST_FINDINGS]:
-        names, one = " and ".join(_PARTS[part] for part in parts), len(parts) == 1
+        names = " and ".join(_PARTS[part] for part in parts)
         air = toolpath.kind[row] == Kind.PTP or CUTTING in parts
         code = "STK011" if air else "STK012"
-        message = (
-            f"{names} {'touches' if one else 'touch'} stock on a rapid motion"
-            if air
-            else f"{names} {'is' if one else 'are'} in the stock"
-        )
+        if air:
+            message = f"{names} collides with the stock on a rapid motion"
+            if len(parts) > 1:
+                message = f"{names} collide with the stock on a rapid motion"
+        else:
+            message = f"{names} is in the stock" if len(parts) == 1 else f"{names} are in the stock"
         findings.append(Finding(code, message, program, int(toolpath.line[row])))
     more = len(cut.hits) - len(findings)
     if more > 0:

@@ -191,7 +191,7 @@ def _cutter(
                 raise section.error("YML004", "is not below the diameter", "tip_diameter")
     if edge is not None and taper is not None and (radius - tip) / tan(taper) > edge * (1 + 1e-6):
         ends = 2 * (tip + edge * tan(taper)) / MM
-        message = f"the edges end at a diameter of {ends:.4g} mm, below {2 * radius / MM:.6g} mm"
+        message = f"the diameter where the edges end is {ends:.4g} mm, below {2 * radius / MM:.6g} mm"
         help = f"compare {key}, the whole angle in deg, with length and diameter"
         raise section.error("YML004", message, "length", help)
     if edge is not None and edge < corner:
