@@ -115,7 +115,7 @@ def scatter_of(fitted: Fit) -> Scatter | None:
     total = sizes[0] * count + sum(s * part.squares for s, part in zip(sizes[1:], parts, strict=True))
     if not total > 0:
         return None
-    # how large all of it is, the fit has told
+    # how large all of it is, the fit has estimated
     own, *shared = (sizes * assumed / total).tolist()
     return Scatter(own, tuple(shared), parts, weights, fitted.factor)
 
