@@ -57,3 +57,19 @@ def test_what_no_group_explains_gets_no_two():
         one = problem(residual, nothing, [(own, FREE) for own in columns], 3 * POSES, True, POSES)
         count += bool(selected(one, range(GROUPS)).groups)
     assert count <= 2
+
+
+@pytest.mark.parametrize(("gain", "count"), [(45.0, 0), (150.0, 2)])
+def test_two_count_among_all_pairs(gain, count):
+    """Two groups that differ by a little, which alone explains: each counts beside the other from 33 variances on, but
+    there are 190 pairs, the best of which counts from 65 on.  The other groups explain nothing."""
+    rng = np.random.default_rng(3)
+    q = np.linalg.qr(rng.normal(size=(3 * POSES, GROUPS + 2)))[0]
+    noise = rng.normal(size=3 * POSES)
+    noise -= q @ (q.T @ noise)
+    variance = noise @ noise / (3 * POSES - 3)
+    columns = [q[:, :1], q[:, :1] + 0.05 * q[:, 1:2], *(q[:, k : k + 1] for k in range(2, GROUPS))]
+    residual = np.sqrt(gain * variance) * q[:, 1] + noise
+    groups = [(own, FREE[:1]) for own in columns]
+    one = problem(residual, np.ones((3 * POSES, 1)) / np.sqrt(3 * POSES), groups, 3 * POSES, False, POSES)
+    assert len(selected(one, range(GROUPS)).groups) == count

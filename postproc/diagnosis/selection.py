@@ -282,15 +282,16 @@ def _grown(
             if two is None:
                 break
             best = two
-        now = _exchanged(problem, best, others, penalty)
-        now = _pruned(problem, now, len(candidates))
+        grown = _pruned(problem, _exchanged(problem, best, others, penalty), len(candidates))
+        if set(grown.groups) == set(now.groups):
+            break
+        now = grown
     return now
 
 
 def _two(problem: Problem, now: Explained, others: Sequence[int], penalty: float) -> Explained | None:
     """``now`` with two of ``others`` where no single one counts, but more than scatter remains: each of two large
-    effects is scatter for the other.  None where no two count, among all pairs, or one of them does not beside the
-    other."""
+    effects is scatter for the other.  None where no two count, among all pairs."""
     if problem.known and scatter(problem, now) <= EXCEEDED:
         return None
     pairs = list(combinations(others, 2))
@@ -299,10 +300,7 @@ def _two(problem: Problem, now: Explained, others: Sequence[int], penalty: float
         return None
     least = _least(problem, tried)
     best = min((one for one, _ in tried), key=lambda one: _score(one, least, penalty))
-    if not counts(problem, now, best, len(pairs)):
-        return None
-    alone = [explained(problem, (*now.groups, g)) for g in best.groups[-2:]]
-    return best if all(counts(problem, one, best, len(others)) for one in alone) else None
+    return best if counts(problem, now, best, len(pairs)) else None
 
 
 def _score(one: Explained, variance: float, penalty: float) -> float:
