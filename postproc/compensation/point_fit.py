@@ -114,8 +114,8 @@ class Curves:
         before, after = parameter < first, parameter > stop
         number = np.where(before, 1.0 - (first - parameter) / (first - ends[:, :1]), number)
         number = np.where(after, last + (parameter - stop) / (ends[:, 1:] - stop), number)
-        number = np.clip(number, 0.0, last + 0.999)
-        low = number.astype(np.int64)
+        number = np.clip(number, 0.0, last + 1.0)
+        low = np.minimum(number.astype(np.int64), last)
         size = np.where(low == 0, first - ends[:, :1], np.where(low == last, ends[:, 1:] - stop, step))
         return low, (number - low)[..., None], size[..., None]
 
