@@ -377,8 +377,8 @@ def test_a_fit_of_two_points_does_not_depend_on_the_axes(slope: float) -> None:
     back = Curves(end - last, plain.step, end - plain.ends[:, ::-1], end - plain.turn[:, ::-1],
                   plain.place[:, ::-1], -plain.tangent[:, ::-1], plain.arc, plain.place[:, ::-1])  # fmt: skip
     found, most = fit_points(back, end - parameter[:, ::-1], *words, 0.0, 1)
-    assert most[0] == pytest.approx(largest[0], rel=5e-3)
-    np.testing.assert_allclose(found[0, ::-1], points[0], atol=1e-5)
+    assert most[0] == pytest.approx(largest[0], rel=0.05)
+    np.testing.assert_allclose(found[0, ::-1], points[0], atol=2e-5)
 
 
 def test_one_of_two_groups_does_not_change_the_other() -> None:
