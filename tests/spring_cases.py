@@ -9,9 +9,9 @@ from path_cases import task
 
 from postproc.base.geometry import Poses, product, rotation_from_vector
 from postproc.compensation.correct import CorrectionResult, MotionOutcome
-from postproc.compensation.mirror import Prediction
+from postproc.compensation.mirror import Correction, Prediction
 from postproc.compensation.problem import CompensationProblem
-from postproc.compensation.subdivision import Subdivision
+from postproc.compensation.subdivision import Subdivision, subdivided_motions
 from postproc.process.force_ramps import Ramps
 from postproc.toolpath import Kind, Role
 
@@ -32,6 +32,17 @@ class SpringProblem(CompensationProblem):
 
     def goal(self, rows, wanted, share=None):
         return wanted
+
+    def start_command(self, rows, wanted, wrench, goal, q=None, share=None):
+        return wanted.copy(), np.zeros((len(rows), 6))
+
+    def command(self, rows, wanted, wrench, goal, start=None, share=None):
+        n, yes, zero = len(rows), np.ones(len(rows), bool), np.zeros(len(rows))
+        pose = Poses(goal.rotation.copy(), goal.position - wrench[:, :3] @ self.COMPLIANCE.T)
+        first = np.linalg.norm(wrench[:, :3] @ self.COMPLIANCE.T, axis=1)
+        history = np.stack([first, zero])
+        return Correction(pose, self.track.q[rows], history, zero, zero, np.zeros((n, 3)),
+                          np.ones(n, int), yes, yes, yes)  # fmt: skip
 
     def unloaded(self, rows, wanted, share=None):
         return self.simulated(rows, wanted, np.zeros((len(rows), 6)))
@@ -95,7 +106,7 @@ def output(job: SpringProblem, shifts, inserted=(), turns=None) -> Subdivision:
 
 
 def corrected(job: SpringProblem, shifts, turns=None) -> CorrectionResult:
-    """As if the ends of all motions with force were corrected by ``shifts`` (N, 3) [m] and turned by ``turns`` about z."""
+    """As if the ends of all motions with force were corrected by ``shifts`` (N, 3) [m] and ``turns`` (N,) about z."""
     n = len(job.toolpath)
     state = np.where(job.carries, MotionOutcome.CORRECTED, MotionOutcome.AIR)
     turn = np.zeros((n, 3))
@@ -121,8 +132,8 @@ def corrected(job: SpringProblem, shifts, turns=None) -> CorrectionResult:
 
 def drawn(points: np.ndarray, reach: np.ndarray, count: int = 401) -> tuple[np.ndarray, np.ndarray]:
     """The polygon through ``points`` (K, D), of which the first three numbers are places, each point rounded off from
-    ``reach`` (K,) [m] on, no farther than half of either line, by ``count`` places (odd) a piece: places (S, D), and to which line (S,) they belong: the
-    middle of a parabola, once each, to both."""
+    ``reach`` (K,) [m] on, no farther than half of either line, by ``count`` places (odd) a piece: places (S, D), and to
+    which line (S,) they belong: the middle of a parabola, once each, to both."""
     length = np.linalg.norm(np.diff(points[:, :3], axis=0), axis=1)
     d = np.zeros(len(points))
     d[1:-1] = np.minimum(reach[1:-1], 0.5 * np.minimum(length[:-1], length[1:]))
@@ -140,3 +151,63 @@ def drawn(points: np.ndarray, reach: np.ndarray, count: int = 401) -> tuple[np.n
             places += [curve[: half + 1], curve[half:]]
             lines += [np.full(half + 1, k), np.full(half + 1, k + 1)]
     return np.concatenate(places), np.concatenate(lines)
+
+
+def places_along(lengths, reach, position, spacing):
+    """Places (S, D) on a path of motions of ``lengths`` (K,) [m] and their distances (S,) [m] along it; rounded off
+    from ``reach`` (K,) [m] before the end of each on; ``position``(k, share) gives (S, D) on one motion."""
+    ends = np.concatenate([[0.0], np.cumsum(lengths)])
+    found, at = [], []
+    for k, length in enumerate(lengths):
+        before = reach[k - 1] if k else 0.0
+        s = np.linspace(before, length - reach[k], max(int((length - before - reach[k]) / spacing), 33))
+        found.append(position(k, s / length))
+        at.append(ends[k] + s)
+        d = reach[k]
+        if k + 1 < len(lengths) and d > 0:
+            t = np.linspace(0.0, 1.0, max(int(2 * d / spacing), 65))[1:-1, None]
+            one = position(k, 1.0 - d * (1.0 - t[:, 0]) / length)
+            two = position(k + 1, d * t[:, 0] / lengths[k + 1])
+            found.append((1.0 - t) * one + t * two)
+            at.append(ends[k + 1] + d * (2.0 * t[:, 0] - 1.0))
+    return np.concatenate(found), np.concatenate(at)
+
+
+def largest_error(job: SpringProblem, division: Subdivision, rows, blend, around, spacing=0.01 * MM):
+    """[m] by how much the tool is off within ``around`` [m] of the start of the last of ``rows``, by brute force: the
+    original and the output drawn place by place, the force of the place that the tool is square to looked for among
+    all.  ``blend`` (N,) [m]: of the motions of the program, and of what is inserted into them."""
+    rows = np.asarray(rows)
+    length = job.desired_path.length[rows]
+    reach = np.append(np.minimum(blend[rows[:-1]], 0.5 * np.minimum(length[:-1], length[1:])), 0.0)
+    base, s = places_along(
+        length, reach, lambda k, t: job.desired_path.at(np.full(len(t), rows[k]), t).position, spacing
+    )
+    motions = np.flatnonzero(np.isin(division.source, rows))
+    pieces = subdivided_motions(job, division, motions)
+    size = np.linalg.norm(pieces.end.position - pieces.start.position, axis=1)
+    arc = np.isfinite(pieces.sweep)
+    radius = np.linalg.norm(pieces.start.position - pieces.centre, axis=1)
+    size[arc] = (pieces.sweep * radius)[arc]
+    stated = blend[division.source[motions]]
+    round_ = np.append(np.minimum(stated[:-1], 0.5 * np.minimum(size[:-1], size[1:])), 0.0)
+    sent, _ = places_along(size, round_, lambda k, t: pieces[np.full(len(t), k)].at(t).position, 4 * spacing)
+    start = np.cumsum(length)[-2] if len(rows) > 1 else 0.0
+    vertex = job.desired_path.at(rows[-1:], np.zeros(1)).position[0]
+    sent = sent[np.linalg.norm(sent - vertex, axis=1) < around]
+    near = np.abs(s - start) < around + 2 * MM
+    base, s = base[near], s[near]
+    row = np.minimum(np.searchsorted(np.cumsum(length), s, side="right"), len(rows) - 1)
+    share = (s - np.concatenate([[0.0], np.cumsum(length)])[row]) / length[row]
+    yields = job.force.along(rows[row], np.clip(share, 0.0, 1.0))[:, :3] @ job.COMPLIANCE.T
+    tangent = np.gradient(base, axis=0)
+    largest = 0.0
+    for one in sent:
+        away = one + yields - base
+        gap = np.sum(away * tangent, axis=1)
+        at = np.flatnonzero((gap[:-1] > 0) & (gap[1:] <= 0))
+        if len(at):
+            part = (gap[at] / (gap[at] - gap[at + 1]))[:, None]
+            here = away[at] + part * (away[at + 1] - away[at])
+            largest = max(largest, float(np.linalg.norm(here, axis=1).min()))
+    return largest

@@ -1,4 +1,4 @@
-"""Laws of approximated corners: which are looked at, by how much they are off, and where points are inserted for them."""
+"""Laws of approximated corners: which are looked at, how far they are off, and where points are inserted for them."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ RIGHT = np.array([[-60, 0, 0], [-50, 0, 0], [0, 0, 0], [0, 60, 0], [0, 70, 0]]) 
 
 
 def turned(angles, length=50.0):
-    """A path of K + 3 motions of ``length`` [mm] that turns by ``angles`` (K,) [rad] about z at the ends of the third and
-    those after it, but for the last."""
+    """A path of K + 3 motions of ``length`` [mm] that turns by ``angles`` (K,) [rad] about z at the ends of the third
+    and those after it, but for the last."""
     heading = np.cumsum([0.0, 0.0, *angles])
     steps = length * MM * np.stack([np.cos(heading), np.sin(heading), 0.0 * heading], axis=1)
     return np.concatenate([[[0.0, 0.0, 0.0]], np.cumsum(steps, axis=0)]) - [0.1, 0.0, 0.0]
@@ -275,8 +275,8 @@ def of_group(away, found, group):
 
 @pytest.mark.parametrize("error", [1.7, 1.9, 2.2, 4.0, 9.0])
 def test_straight_on_one_point_is_inserted_on_each_side(error):
-    """Its own point leaves half of an error of its own; two others, as far away as it is rounded twice, 0.375 of it, and
-    nearer ones in proportion: nine tenths of what is allowed are to be left."""
+    """Its own point leaves half of an error of its own; two others, as far away as it is rounded twice, 0.375 of it,
+    and nearer ones in proportion: nine tenths of what is allowed are to be left."""
     job = path(turned(np.zeros(1)))
     away, found = chosen_points(job, output(job, np.zeros((4, 3))), [error])
     assert not found.inner.any()

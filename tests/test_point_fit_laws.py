@@ -10,9 +10,9 @@ from scipy.optimize import linprog
 from postproc.compensation.closest_points import closest_points
 from postproc.compensation.point_fit import (
     Curves,
-    _least_largest,
     evaluate_polygons,
     fit_points,
+    least_largest,
     long_enough,
     moved_apart,
 )
@@ -308,7 +308,7 @@ def test_the_step_makes_the_largest_error_nearly_as_small_as_a_linear_programme_
     off, slope = np.zeros((groups, samples, 3)), np.zeros((groups, samples, 3, free))
     off[:, :, 1] = rng.normal(size=(groups, samples))
     slope[:, :, 1] = rng.normal(size=(groups, samples, free))
-    step = _least_largest(off, slope, np.full(groups, 1e-9))
+    step = least_largest(off, slope, np.full(groups, 1e-9))
     assert step.shape == (groups, free)
     for group in range(groups):
         now, by = off[group, :, 1], slope[group, :, 1]
@@ -321,9 +321,9 @@ def test_the_step_makes_the_largest_error_nearly_as_small_as_a_linear_programme_
     heights = np.array([-3.0, 1.0, 5.0, 0.0])
     off, slope = np.zeros((1, 4, 3)), np.zeros((1, 4, 3, 1))
     off[0, :, 0], slope[0, :, 0, 0] = heights, 1.0
-    assert _least_largest(off, slope, np.full(1, 1e-9))[0, 0] == pytest.approx(-1.0, abs=0.15)
+    assert least_largest(off, slope, np.full(1, 1e-9))[0, 0] == pytest.approx(-1.0, abs=0.15)
     # a large damping keeps it where it is
-    assert abs(_least_largest(off, slope, np.full(1, 1e6))[0, 0]) < 1e-4
+    assert abs(least_largest(off, slope, np.full(1, 1e6))[0, 0]) < 1e-4
 
 
 def bent(slope: float) -> Curves:
