@@ -108,7 +108,7 @@ def test_exact_motions_get_a_second_point_but_where_points_stay_exact():
 
 def test_points_keep_the_shortest_motion_from_each_other_and_from_the_ends():
     for end, parted in ((0.4, False), (0.6, True), (59.6, False), (59.4, True)):
-        found = inserted(ramped({2: 0.9}, {2: end}, [50, 60, 50], 0.2), row=2)
+        found = inserted(ramped({2: 0.3}, {2: end}, [50, 60, 50], 0.2), row=2)
         assert (np.abs(found - end) < 1e-9).any() == parted
         assert (np.minimum(found, 60.0 - found) > 0.499).all()
     # ramps that set in one motion after the other end in the same one: the first of two that are too near stays
