@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from spring_cases import MM, largest_error, spring, with_ramp
 
-from postproc.compensation.corner_fit import fit_corners
+from postproc.compensation.corner_fit import corners_not_improved, fit_corners
 from postproc.compensation.corners import rounded_errors
 from postproc.compensation.correct import correct
+from postproc.compensation.ramp_points import NEVER
 from postproc.compensation.subdivide import subdivide
 from postproc.compensation.subdivision import Limits
 from postproc.toolpath import Arcs, EditConstraints, Kind, Role
@@ -251,4 +252,107 @@ def test_corners_where_the_deflection_bends_without_a_ramp(angle, distance):
         assert np.isin(division.fits.corner, own).all()
     else:
         assert division is plain
+    del result, fit
+
+
+@pytest.mark.parametrize(("angle", "second", "distance"), [(np.pi / 2, TURNED, 0.5), (0.0, REVERSED, 2.0)])
+def test_more_points_are_taken_where_so_many_are_asked_for(angle, second, distance):
+    """As few as hold, at least as many as are asked for; and none on a ramp that is to stay as it is."""
+    job, _ = two_motions(angle, second, distance)
+    result, plain, _, division = fitted(job)
+    free = division.inserted
+    for least in (1, 2, 3, 4):
+        fit, more = fit_corners(job, result, plain, FREE, {(2, 1.0): least})
+        assert more.inserted == max(free, least)
+        assert rounded_errors(job, fit, more)[1].max() < job.tolerance
+        is_in_order(job, plain, more, FREE)
+    # of another corner it says nothing
+    assert fit_corners(job, result, plain, FREE, {(1, 1.0): 4, (3, 1.0): 4})[1].inserted == free
+    # so many may be inserted, and one more is not needed
+    exactly = replace(FREE, max_growth=1.0, least=max(free, plain.inserted))
+    same = fit_corners(job, result, plain, exactly)[1]
+    np.testing.assert_allclose(same.share, division.share, atol=1e-12)
+
+
+def test_a_ramp_after_an_exact_point_gets_more_points_where_they_are_asked_for():
+    """It is known by the place where it ends."""
+    job, _ = two_motions(0.0, REVERSED, 2.0)
+    job = replace(job, toolpath=job.toolpath.with_columns(approximation=np.array([0.0, 0.0, 0.0, 2.0 * MM])))
+    result, plain, _, division = fitted(job)
+    free = division.inserted
+    assert division.fits is not None
+    key = (3, float(plain.share[np.isclose(plain.share, 0.05)][0]))
+    for least in (2, 3):
+        more = fit_corners(job, result, plain, FREE, {key: least})[1]
+        assert more.inserted == max(free, least)
+
+
+def test_a_fit_that_is_worse_as_written_asks_for_one_point_more():
+    """Of a ramp; a corner without one, or one of which the distance is not known as it was written, stays as it was."""
+    job, blend = two_motions(np.pi / 2, TURNED, 2.0)
+    _, _, _, division = fitted(job)
+    assert division.fits is not None
+    written = replace(division, blend=np.where(division.share < 1.0, blend[3], blend[division.source]))
+    assert corners_not_improved(job, written) == {}
+    command = division.command[np.arange(len(division))].copy()
+    command.position[division.fits.point[0]] += [0.0, 0.1 * MM, 0.1 * MM]
+    count = division.inserted
+    assert corners_not_improved(job, replace(written, command=command)) == {(2, 1.0): count + 1}
+    unknown = replace(division, blend=np.full(len(division), np.nan))
+    assert corners_not_improved(job, unknown) == {(2, 1.0): count + 1}
+    alone = replace(division.fits, inserted=np.zeros(len(division.fits.point), np.int64))
+    assert corners_not_improved(job, replace(unknown, fits=alone)) == {(2, 1.0): NEVER}
+    assert corners_not_improved(job, replace(unknown, fits=None)) == {}
+
+
+@pytest.mark.parametrize("ramp_first", [True, False])
+def test_a_ramp_and_a_corner_of_one_program_are_fitted_both(ramp_first):
+    """At one vertex the force falls on a ramp, at another it goes over evenly, so that the correction turns there."""
+    x = np.array([-120.0, -120.0, -60.0, 0.0, 60.0, 120.0])
+    points = np.stack([x, 0 * x, [20, 0, 0, 0, 0, 0]], axis=1) * MM
+    across = np.array([[0.0, 0.0, 0.0], [1e-6, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    force, start = np.zeros((6, 6)), np.zeros((6, 6))
+    if ramp_first:  # after row 2, and the turn after row 4
+        row, force[2:, 0], start[2:, 0] = 3, [900, 100, 100, 1500], [900, 100, 100, 100]
+        blend = np.array([0.0, 0.0, 2.0, 2.0, 4.0, 2.0]) * MM
+    else:  # turns after rows 2 and 3, the ramp after row 4
+        row, force[2:, 0], start[2:, 0] = 5, [100, 1500, 900, 100], [100, 100, 1500, 100]
+        blend = np.array([0.0, 0.0, 4.0, 4.0, 2.0, 2.0]) * MM
+    job = spring(points, [False, False, *[True] * 4], across, force[:, :3], start=start, approximation=blend)
+    job = with_ramp(job, [row], [[-800.0, 0, 0]], [5 * MM])
+    _, plain, _, division = fitted(job)
+    errors = [
+        max(largest_error(job, some, rows, blend, 9 * MM) for rows in ([2, 3], [3, 4], [4, 5]))
+        for some in (plain, division)
+    ]
+    assert errors[0] > job.tolerance > errors[1]
+    fits = division.fits
+    assert fits is not None
+    assert len(set(division.source[fits.corner].tolist())) > 1
+    assert (np.diff(fits.point) > 0).all()
+    inserted = division.role[fits.point] == Role.INTERMEDIATE
+    ramp = division.source[fits.corner] == row - 1
+    assert (fits.inserted[ramp] == (ramp & inserted).sum()).all()
+    assert (fits.inserted[~ramp] == 0).all()
+    assert np.isin(division.source[fits.point[ramp]], [row - 1, row]).all()
+    is_in_order(job, plain, division, FREE)
+    own, before = np.flatnonzero(division.original), np.flatnonzero(plain.original)
+    moved = np.linalg.norm(division.command[own].position - plain.command[before].position, axis=1)
+    assert (moved[~np.isin(own, fits.point)] < 1e-9).all()
+    assert (moved[np.isin(own, fits.corner)] > 1e-7).all()
+
+
+def test_points_that_were_inserted_without_a_ramp_are_no_ramp():
+    """Along an arc under a force that goes over evenly, no arc follows the corrected path: it is divided."""
+    job, blend = arc_then_line(60.0, 1.0, MORE)
+    start = np.zeros((4, 6))
+    start[2, :3], start[3, :3] = FIRST, 3.0 * MORE
+    values = start.copy()
+    values[2, :3] = 3.0 * MORE
+    job = replace(job, force=replace(job.force, values=values, start=start, ramps=None))
+    result, plain, fit, division = fitted(job)
+    assert plain.inserted > 0
+    assert largest_error(job, division, [2, 3], blend, 9 * MM) < 1.05 * max(
+        job.tolerance, largest_error(job, plain, [2, 3], blend, 9 * MM)
+    )
     del result, fit
