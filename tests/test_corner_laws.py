@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from path_cases import circle
-from spring_cases import MM, corrected, output, spring, with_ramp
+from spring_cases import AT, MM, corrected, output, spring, with_ramp
 
 from postproc.compensation.corner_points import PointChooser, shortest_arc
 from postproc.compensation.corners import (
@@ -19,6 +19,7 @@ from postproc.compensation.corners import (
     suspect_corners,
 )
 from postproc.compensation.subdivision import Limits
+from postproc.toolpath import Arcs, Kind
 
 D, TOLERANCE = 2.0 * MM, 2e-5
 """[m] Approximation of all corners here, and what a corner may be off."""
@@ -415,3 +416,27 @@ def test_the_shortest_arc_leaves_its_chord_by_a_tenth_of_the_tolerance():
         length = shortest_arc(job, np.array([2]))[0]
         radius = diameter / 2
         assert radius * (1.0 - np.cos(length / (2 * radius))) == pytest.approx(0.1 * job.tolerance, rel=1e-4)
+
+
+@pytest.mark.parametrize("arc_first", [True, False])
+def test_a_corner_between_a_line_and_an_arc_is_found_by_the_tangents(arc_first):
+    """The chord of the arc goes on as the line does, the arc itself turns by half of its sweep: that is rounded off."""
+    sweep, chord = 0.2, 60.0
+    x = np.array([-200.0, -150.0, -chord, 0.0, chord, 150.0])
+    points = np.stack([x, 0 * x, 0 * x], axis=1) * MM
+    row, middle = (3, -0.5 * chord) if arc_first else (4, 0.5 * chord)
+    none, sweeps = np.full((6, 3), np.nan), np.full(6, np.nan)
+    centre, normal = none.copy(), none.copy()
+    centre[row] = AT + np.array([middle, 0.5 * chord / np.tan(0.5 * sweep), 0.0]) * MM
+    normal[row], sweeps[row] = [0.0, 0.0, 1.0], sweep
+    kinds = [Kind.PTP] + [Kind.LIN] * 5
+    kinds[row] = Kind.CIRC
+    job = path(points, kind=kinds, arcs=Arcs(centre=centre, normal=normal, sweep=sweeps))
+    none = np.zeros((6, 3))
+    division = output(job, none)
+    circles = job.desired_path.circles(np.arange(6))
+    division = replace(division, centre=circles[0], normal=circles[1], sweep=circles[2])
+    found = rows_found(job, corrected(job, none), division)
+    assert found == [row - 1, row]
+    suspect = suspect_corners(job, corrected(job, none), division, np.array([2, 3, 4]))
+    assert {row - 1, row} <= set(suspect.tolist())

@@ -137,3 +137,19 @@ def test_nothing_is_inserted_where_nothing_may_be():
     np.testing.assert_allclose(few, [5.0], rtol=1e-9)
     two = inserted(job, replace(FREE, max_growth=1.5), row=2)
     assert len(two) <= 2
+
+
+@pytest.mark.parametrize(("kink", "second"), [(0.03, True), (0.015, False)])
+@pytest.mark.parametrize("slope", [-0.05, 0.04])
+def test_only_the_turn_of_the_correction_counts_not_its_slope(kink, second, slope):
+    """The force goes over evenly along the motion as well: before and after the end of the ramp the same slope more."""
+    job = ramped({2: kink}, {2: 5.0}, [50, 100, 50], 10.0)
+    values, start = (np.array(some) for some in (job.force.values, job.force.start[np.arange(4)]))
+    more = slope * 0.1 / ACROSS
+    values[2:, 0] += more
+    start[2, 0] = values[2, 0] - more
+    start[3, 0] = values[2, 0]
+    job = replace(job, force=replace(job.force, values=values, start=start))
+    found = inserted(job, row=2)
+    near = found[found < 8.0]
+    np.testing.assert_allclose(near, [5.0, 5.5] if second else [5.0], rtol=1e-9)

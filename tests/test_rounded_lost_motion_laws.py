@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from path_cases import task
 from test_lost_motion import GAP, lagging, lossy
 
 from postproc.compensation.correct import correct
+from postproc.compensation.gap_sides import GapSides
 from postproc.compensation.rounded_path import RoundedOutput, sides_of_output
 from postproc.compensation.subdivide import subdivide
 from postproc.compensation.subdivision import Limits
@@ -75,3 +78,26 @@ def test_a_corner_at_which_no_axis_turns_round_keeps_its_side():
     motion, share = np.repeat(motions[1:], 50), np.tile(np.linspace(0.02, 1.0, 50), len(motions) - 1)
     assert np.ptp(sides.at(motion, share)[:, 0]) < 1e-6
     assert abs(sides.at(motion, share)[0, 0]) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_of_a_motion_from_an_unknown_place_no_side_is_known():
+    """Nor of the motions that it is divided into, but for those where sides were looked for."""
+    job = there_and_back(8 * MM)
+    division = subdivide(job, correct(job), FREE)
+    lost = job.lost_motion
+    keep = lost.row != 3
+    names = ("row", "share", "axes", "aim", "moved")
+    restart = np.where(lost.row == 4, np.append(False, lost.row[1:] != lost.row[:-1]), lost.restart)[keep]
+    programmed = GapSides.of(
+        (2.0 * lost.row + lost.share)[keep], lost.axes[keep], lost.programmed.gap, restart
+    )
+    parts = {name: getattr(lost, name)[keep] for name in names}
+    unknown = replace(job, lost_motion=replace(lost, programmed=programmed, restart=restart, **parts))
+    motions = np.flatnonzero((division.source == 3) & ~division.transitions)
+    found = sides_of_output(unknown, replace(division)).at(motions, np.full(len(motions), 0.7))
+    assert (found[3:-3, 0] == 0).all()
+    assert len(found) > 20
+    known = np.flatnonzero(division.source == 2)[1:-3]
+    one, two = (sides_of_output(j, replace(division)).at(known, np.ones(len(known))) for j in (job, unknown))
+    np.testing.assert_allclose(one[:, 0], two[:, 0], atol=1e-6)
+    assert (one[:, 0] != 0).all()
