@@ -153,3 +153,13 @@ def test_only_the_turn_of_the_correction_counts_not_its_slope(kink, second, slop
     found = inserted(job, row=2)
     near = found[found < 8.0]
     np.testing.assert_allclose(near, [5.0, 5.5] if second else [5.0], rtol=1e-9)
+
+
+def test_each_of_two_ramps_that_end_in_one_motion_has_its_second_point():
+    """The first has room until the second, whatever the vertex at the end of the motion is rounded off by."""
+    job = ramped({2: 0.03, 3: 0.03}, {2: 15.0, 3: 40.0}, [50, 10, 100, 50], 2.0)
+    np.testing.assert_allclose(inserted(job, row=3), [5.0, 5.5, 40.0, 40.5], rtol=1e-9)
+    near = ramped({2: 0.03, 3: 0.03}, {2: 15.0, 3: 5.9}, [50, 10, 100, 50], 2.0)
+    found = inserted(near, row=3)
+    assert np.isclose(found, 5.0).any()
+    assert (np.diff(found) > 0.499).all()

@@ -77,3 +77,16 @@ def test_the_first_motion_turns_the_tool_against_none():
     plain, other = dead_band(job), dead_band(turned)
     np.testing.assert_allclose(other[:-1], plain[:-1], rtol=1e-9)
     assert (other[-1] > 1.5 * plain[-1]).any()
+
+
+def test_what_is_known_along_a_motion_is_known_of_its_places():
+    """Uncorrected as it is programmed; at the ends of motions it is what it is without a share."""
+    job = lossy(there_and_back(), axes=(2, 3))
+    rows = np.repeat(np.arange(1, 6), 4)
+    share = np.tile([0.1, 0.5, 0.9, 1.0], 5)
+    found = job.conditions_at(rows, share).direction
+    np.testing.assert_array_equal(found, job.lost_motion.programmed.at(rows, share))
+    assert (np.abs(found - job.conditions_at(rows).direction)[:, 1:3] > 0.5).any()
+    np.testing.assert_array_equal(found[3::4], job.conditions_at(rows[3::4]).direction)
+    corrected = job.conditions_at(rows, share, corrected=True).direction
+    np.testing.assert_allclose(corrected, job.lost_motion.run(1.0).at(rows, share), atol=1e-12)
