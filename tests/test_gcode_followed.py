@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from posted_programs import posted_programs
 from postproc.base.document import Document
 from postproc.languages.dialect import Program, ReadingSettings
 from postproc.languages.gcode import DIALECTS
+from postproc.toolpath import Toolpath
 from postproc.toolpath.initial_state import InitialState
 
 DIALECT = {dialect.name: dialect for dialect in DIALECTS}
@@ -203,7 +205,57 @@ def test_the_advice_for_a_reference_point_that_is_not_stated() -> None:
     def advice(text: str) -> list[str]:
         return [finding.help for finding in read("fanuc", text).findings if finding.code == "GCO013"]
 
-    assert advice("G28 B0.\nG1 X1. Y1. Z1.\n") == [
-        "state where G28 leads rotary axes in the cell: symbols: {G28: {B: 0}}"
+    before = "state B under program_start: in the cell, or write B before it"
+    reached = "state where G28 leads rotary axes in the cell: symbols: {G28: {B: 0}}"
+    assert advice("G28 B0.\nG1 X1. Y1. Z1.\n") == [before, reached]
+    assert advice("G28 Z0.\nG30 B0. C0.\nG1 X1. Y1. Z1.\n")[1:] == [
+        "state where G30 leads rotary axes in the cell: symbols: {G30: {B: 0, C: 0}}"
     ]
-    assert advice("G28 Z0.\nG1 X1. Y1. Z1. B5.\n") == [""]
+    turned = advice("G1 X1. Y1. Z1. B5.\n")[1]
+    assert turned.startswith(
+        "state in the cell what A, B, C do: dialect: {rotary_words: part} if they turn the part"
+    )
+
+
+ROTARY = "G0 X0. Y0. Z9. B90. C30.\nG1 Z-1. F100.\nX10. B91.\nG2 X20. I5.\nG81 X5. Z-2. R3.\nG80\nG93 G1 X0. C0. F5.\n"
+
+
+def _columns(path: Toolpath) -> list[np.ndarray]:
+    return [path.position, path.rotation, path.base, path.tool, path.arcs.centre, path.arcs.sweep, path.kind]
+
+
+@pytest.mark.parametrize("name", ["linuxcnc", "fanuc"])
+def test_rotary_words_that_turn_the_part_leave_the_tool_where_it_is(name: str) -> None:
+    """As the cell states it; the tool is where the same program without the words has it, the part is not."""
+    turning = read(name, ROTARY, options={"rotary_words": "part"}).toolpath
+    alone = read(name, re.sub(r" [BC]\d+\.", "", ROTARY)).toolpath
+    for one, other in zip(_columns(turning), _columns(alone), strict=True):
+        np.testing.assert_array_equal(one, other)
+    one, other = (
+        {row: found.code for row, found in path.constraints.refused.items()} for path in (turning, alone)
+    )
+    assert one == other
+    assert len(one) < 3
+    assert not turning.constraints.orientation_programmed.any()
+    # F is that of the axes too where they move, but the time of a block is not
+    moved = np.flatnonzero(np.isnan(turning.feed) & ~np.isnan(alone.feed)).tolist()
+    assert [turning.line[row] for row in moved] == [len(HEAD[name].splitlines()) + 3]
+
+
+@pytest.mark.parametrize("name", ["linuxcnc", "fanuc"])
+def test_rotary_words_at_the_tip_are_those_of_a_tcp_mode(name: str) -> None:
+    stated = read(name, ROTARY, options={"rotary_words": "tip"}).toolpath
+    coded = read(name, "G43.4 H1\n" + ROTARY).toolpath
+    for one, other in zip(_columns(stated), _columns(coded), strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert stated.constraints.orientation_programmed.any()
+    refused = read(name, ROTARY).toolpath.constraints.refused
+    assert len(refused) >= 4
+
+
+def test_a_tcp_mode_means_the_same_where_rotary_words_turn_the_part() -> None:
+    text = "G0 B0.\nG43.4 H1\nG1 X5. Y1. Z2. B20.\nG49\n"
+    part, plain = (
+        read("fanuc", text, options=options).toolpath for options in ({"rotary_words": "part"}, {})
+    )
+    np.testing.assert_array_equal(part.rotation[-1], plain.rotation[-1])

@@ -106,13 +106,7 @@ class BlockWords:
         codes = self.words(key("G")).value
         if np.isin(codes, (90.1, 91.1)).any():
             return None
-        absolute = everywhere(1, len(self), np.int8)
-        modal = replace(
-            self.modal,
-            force={**self.modal.force, Group.ARCS: absolute},
-            ahead={**self.modal.ahead, Group.ARCS: 1},
-        )
-        return replace(self, modal=modal)
+        return replace(self, modal=self.modal.holding(Group.ARCS, 1))
 
     def part(self, start: int, stop: int) -> BlockWords:
         """The blocks start .. stop - 1 of a whole program."""

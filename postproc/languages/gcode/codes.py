@@ -117,13 +117,16 @@ CODES = define(
         "GCO013": Code(
             "warning",
             "rotary axes without a TCP mode",
-            meaning="The rotary axes are not at 0, and no TCP mode such as G43.4 is active.",
+            meaning=(
+                "The rotary axes are not at 0, or not known, and no TCP mode such as G43.4 is active; or they are not "
+                "known under one."
+            ),
             consequence=(
                 "The place of the tool depends on the machine's geometry, so the motion is not corrected."
             ),
             action=(
-                "Let the post-processor write tip coordinates (G43.4), or all motions with the rotary "
-                "axes at 0."
+                "Let the post-processor write tip coordinates (G43.4), or all motions with the rotary axes at 0; or "
+                "state in the cell what the rotary words do (dialect: {rotary_words: part} or tip)."
             ),
             example="`G1 X10 B30` without G43.4.",
         ),

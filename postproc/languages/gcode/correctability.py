@@ -19,6 +19,7 @@ from postproc.languages.gcode.feeds import feeds_before_units
 from postproc.languages.gcode.motions import GcodeMotions
 from postproc.languages.gcode.positions import Positions
 from postproc.languages.gcode.refusals import RefusalCollector, RefusalReason, Refusals
+from postproc.languages.gcode.rotary_refusals import refuse_rotary
 from postproc.languages.gcode.words import How, key
 from postproc.toolpath import Kind
 
@@ -168,13 +169,7 @@ def check_correctability(
         "GCO012",
         "it is not known whether I J K are coordinates or differences",
     )
-    led = (modal.has(Once.HOME) & (words.has(*AXES[3:]) | ~words.axis)).any() and words.control.iso
-    reference = "state where G28 leads rotary axes in the cell: symbols: {G28: {B: 0}}" if led else ""
-    for wrong, message in (
-        (1, "a rotary axis is not at 0, or not known, and no TCP mode is active"),
-        (2, "a rotary axis that the program uses is not set yet"),
-    ):
-        refuse(moves.tool_orientation.wrong == wrong, "GCO013", message, reference)
+    refuse_rotary(words, moves, where, reasons, collector)
 
 
 def _is_arc(move: Ints) -> Bools:

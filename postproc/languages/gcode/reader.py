@@ -18,13 +18,14 @@ from postproc.languages.dialect import PLAIN, Program, ReadingSettings
 from postproc.languages.gcode import offsets
 from postproc.languages.gcode.block_arcs import arcs_of_blocks, given_by_point
 from postproc.languages.gcode.blocks import (
+    AXES,
     BlockWords,
     Reasons,
     blocks,
     frame_events,
     tilted,
 )
-from postproc.languages.gcode.cell_options import INTEGER_WORDS
+from postproc.languages.gcode.cell_options import AT_TIP, INTEGER_WORDS, ROTARY_WORDS, TURN_PART
 from postproc.languages.gcode.comments import remarks
 from postproc.languages.gcode.control import (
     Control,
@@ -94,7 +95,10 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     offsets_in_text = execution.source.blocks.start
     source, foreign = joined.at_the_calls(execution.source)
     execution = replace(execution, source=source)
-    given = blocks(source, modal(execution, control, settings.initial.base), control, integers)
+    in_force = modal(execution, control, settings.initial.base)
+    if settings.options.get(ROTARY_WORDS) == AT_TIP:
+        in_force = in_force.holding(Group.TCP, 1)
+    given = blocks(source, in_force, control, integers)
     rows = np.flatnonzero(given.motion).astype(np.int32)
     offset = work_offsets(given)
     base = offset.base[rows]
@@ -266,7 +270,7 @@ def _followed(
     trace = Trace(offsets.start(), events, frame_change(words, events), _start(settings))
     feeds, tool_orientations, away, reasons = (
         Feeds(words),
-        ToolOrientations(words, turned),
+        ToolOrientations(words, turned, settings.options.get(ROTARY_WORDS) == TURN_PART),
         tilted(words),
         Reasons(len(words)),
     )
@@ -299,7 +303,7 @@ def _followed(
         check_correctability(here, moves, where, base[low:high], tool[rows[low:high]], reasons, unbound, part)
         found.put(
             high - low,
-            **_columns(here, where, moves, feeds),
+            **_columns(here, where, moves, feeds, tool_orientations.turn_part),
             blend=np.where(np.isfinite(moves.room), 0.0, blends(here, own, allowed)),
             sets=stated_coordinates(ends.stated(way.sets[own, :3], rows[low:high]), moves, holes),
             lost=way.unknown[own, :3],
@@ -316,9 +320,9 @@ def _followed(
 
 
 def _columns(
-    words: BlockWords, where: Positions, moves: GcodeMotions, feeds: Feeds
+    words: BlockWords, where: Positions, moves: GcodeMotions, feeds: Feeds, turn_part: bool
 ) -> dict[str, NDArray[Any]]:
-    """What is kept of the motions of a part."""
+    """What is kept of the motions of a part; turn_part: as of ``ToolOrientations``."""
     rows, force, stand = moves.block, words.modal.force, moves.tool_orientation
     place = moves.place.copy()
     # beside the contour, by the tool's radius: that is also where the motion after G40 starts
@@ -326,6 +330,11 @@ def _columns(
     place[(words.modal.flow.reason[rows] != 0) | beside | np.isnan(place).any(axis=1)] = np.nan
     placed = ~np.isnan(place[:, :1])
     feed = feeds.of(rows + words.start, moves.length)
+    if turn_part:
+        # without a TCP mode F is also that of the axes that turn the part
+        turning = words.has(*AXES[3:])[rows] & (force[Group.TCP][rows] != 1)
+        turning &= force[Group.FEED][rows] != Feed.INVERSE_TIME
+        feed[turning & (moves.start[:, 3:] != moves.end[:, 3:]).any(axis=1)] = np.nan
     rotary_from, rotary_to = stand.rotary
     return {
         "kind": moves.kind,

@@ -3,8 +3,9 @@
 Rotary axes A, B, C turn the tool against the part: R(A, B, C) = Rz(C) Ry(B) Rx(A) in the base's axes, and the tool
 is at R turned, with ``turned`` its orientation at A = B = C = 0; an axis that no block names stays at 0. That
 holds where X, Y, Z are the tool's tip (TCP modes); else the place of the tip and the orientation of the part are the
-machine's own, and only blocks with all rotary axes at 0 say where the tool is. Controls of robots take A, B, C as
-angles of the tool's frame itself (``Control.whole``). A vector, or angles A2= B2= C2=, say where the tool points in
+machine's own, and only blocks with all rotary axes at 0 say where the tool is, unless the cell states that they turn
+the part (``cell_options.TURN_PART``): then the tool is turned nowhere. Controls of robots take A, B, C as angles of
+the tool's frame itself (``Control.whole``). A vector, or angles A2= B2= C2=, say where the tool points in
 the programmed coordinates; they hold until another block states an orientation.
 
 Between two blocks rotary axes run linearly, as they do under G43.4, under ORIAXES and in the kinematics of LinuxCNC;
@@ -86,9 +87,10 @@ class ToolOrientation:
 class ToolOrientations:
     """The orientation of the motions of a program, which come block by block."""
 
-    def __init__(self, words: BlockWords, turned: Floats | None) -> None:
-        """given: the whole program; turned (3, 3): the tool in the base at A = B = C = 0; None where none is stated."""
-        self._given, self._turned = words, turned
+    def __init__(self, words: BlockWords, turned: Floats | None, turn_part: bool = False) -> None:
+        """given: the whole program; turned (3, 3): the tool in the base at A = B = C = 0; None where none is stated;
+        turn_part: without a TCP mode rotary axes turn the part."""
+        self._given, self._turned, self.turn_part = words, turned, turn_part
         self._tcp = words.modal.force[Group.TCP] == 1
         self._used = np.array([len(words.words(one)) > 0 for one in _ROTARY_KEYS])
         others = (*words.control.vector, *words.control.euler)
@@ -107,17 +109,18 @@ class ToolOrientations:
         result = ToolOrientation(**{name: np.array(column) for name, column in result.__dict__.items()})
         blocks = rows + first
         kind = self._kind[blocks]
-        _machine(where, rows, rapid, used, self._tcp[blocks], kind, result)
+        turning = np.zeros(3, np.bool_) if self.turn_part else used
+        _machine(where, rows, rapid, turning, self._tcp[blocks], kind, result)
         inside = self._tcp[blocks] & (kind != _NOWHERE)
         given = self._given.part(first, first + len(where.frame))
-        turning = np.array([frame.shift[3:].any() for frame in where.frames])
+        moved = np.array([frame.shift[3:].any() for frame in where.frames])
         pairs = np.stack([kind, np.where(kind == ROTARY, 0, where.frame[rows])], axis=1)
         for one, frame in np.unique(pairs[inside], axis=0).tolist():
             here = np.flatnonzero(inside & (pairs == (one, frame)).all(axis=1))
             number = self._orientation(one, frame, where)
             orientation = self.orientations[number]
             result.orient[here] = number
-            shifted = turning[where.frame[rows[here]]]
+            shifted = moved[where.frame[rows[here]]]
             ends = where.end[rows[here], 3:]
             values = self._values(trace, one, blocks[here], ends, orientation)
             result.values[here] = values
