@@ -102,7 +102,7 @@ def run(name: str, text: str, **settings: object) -> list[str]:
         ("sinumerik", "MCALL CYCLE81(R1,0,2,-5)\nX1\nMCALL\nG1 X2 Y2\n", ["?*", "?*"]),
         ("sinumerik", "R1=30\nMCALL CYCLE81(R1,0,2,-5)\nX1\nMCALL\nG1 X2\n", ["1 0 30*", "2 0 30"]),
         ("sinumerik", "CYCLE800()\nG1 X1 Y1 Z1\n", ["1 1 1"]),
-        ("sinumerik", 'CYCLE800(1,"",0,57,0,0,0,0,30,0,0,0,0,1)\nG1 X1 Y1 Z1\n', ["?*"]),
+        ("sinumerik", 'CYCLE800(1,"",0,57,0,0,0,0,30,0,0,0,0,1)\nG1 X1 Y1 Z1\n', ["1.36603 1 0.366025"]),
         ("sinumerik", 'CYCLE800(1,"",0,57,0,0,0,0,R1,0,0,0,0,1)\nG1 X1 Y1 Z1\n', ["?*"]),
     ],
 )  # fmt: skip

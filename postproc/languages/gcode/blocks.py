@@ -388,6 +388,8 @@ def frame_events(
         if force[group].any() or modal.ahead[group]:
             lose(whole, (force[group] != 0) & words.motion, What.FRAME)
             leave(whole, modal.switched(group), What.FRAME)
+    if force[Group.PLACED].any() or modal.ahead[Group.PLACED]:
+        leave(linear, modal.switched(Group.PLACED) | (modal.has(Once.FRAME) & words.control.iso), What.FRAME)
     # With the rotary axes at 0 the words mean the same with and without a TCP mode.
     leave(linear, modal.switched(Group.TCP) & away, What.TIP)
     if lengths.any():

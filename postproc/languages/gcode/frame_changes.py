@@ -20,6 +20,9 @@ def frame_blocks(words: BlockWords) -> Ints:
     """(K,) the blocks that change the frame: G92 and G52 only with coordinates."""
     mentioned = words.has(*(key(letter) for letter in "XYZABC"))
     always = words.modal.has(Once.UNSHIFT, Once.SUSPEND, Once.RESTORE, Once.FRAME)
+    placed = words.modal.force[Group.PLACED]
+    if placed.any():
+        always |= words.modal.switched(Group.PLACED) | (words.modal.switched(Group.OFFSET) & (placed != 0))
     return np.flatnonzero(
         (always | (words.modal.has(Once.SHIFT, Once.LOCAL) & mentioned)) & words.modal.flow.tape
     )
@@ -60,6 +63,7 @@ def frame_change(
             float(here.length[0]),
             frame,
             position,
+            int(here.modal.force[Group.DISTANCE][0]) == 0,
         )
         after = change(event)
         after = replace(after, shift=np.where(np.abs(after.shift) > FARTHEST * MM, np.nan, after.shift))

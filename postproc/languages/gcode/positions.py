@@ -78,6 +78,10 @@ class Trace:
         """Rows (K,) in ``frames`` of blocks (K,) that were followed."""
         return np.searchsorted(self._events, blocks, side="right").astype(np.int16)
 
+    def started(self, frames: Ints) -> Ints:
+        """The blocks (K,) that start the frames of rows ``frames`` (K,) in ``frames``; 0 of the first."""
+        return np.append(0, self._events)[frames]
+
     def follow(self, axis_words: AxisWords, start: int) -> Positions:
         """The next blocks, of which ``start`` is the first."""
         n = len(axis_words.value)
@@ -108,6 +112,8 @@ class Trace:
             frame = ProgrammedFrame(np.eye(3), np.full(6, np.nan))
         self.frames.append(frame)
         self._here = frame.from_base(there)
+        if frame.rotary is not None:
+            self._here[3:] = frame.rotary
         self._origin = np.where(np.isnan(self._here), event, self._origin)
 
     def _scan(self, axis_words: AxisWords, piece: slice, first: int, positions: Positions) -> None:

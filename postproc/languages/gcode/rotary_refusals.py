@@ -23,6 +23,12 @@ AWAY = RefusalReason(
 OTHERS = RefusalReason(
     "GCO013", "the orientation is stated by words that only a TCP mode reads, and none is active", "others"
 )
+LEFT = RefusalReason(
+    "GCO013",
+    "the tool is along a plane that is no longer in force, and no rotary axis states that it is back",
+    "plane",
+    "write the words of the rotary axes after the plane (G0 A0 C0)",
+)
 UNKNOWN = RefusalReason("GCO013", "what states the orientation of the tool is not known", "unknown")
 
 
@@ -44,11 +50,13 @@ def refuse_rotary(
     lost = np.isnan(moves.end[some, 3:]) & used
     tcp = words.modal.force[Group.TCP][rows] == 1
     causes = np.where(lost, where.source[rows, 3:], _KNOWN)
-    state = np.stack([tcp, ~tcp & _away(moves, some, used)], axis=1)
+    state = np.stack([tcp, ~tcp & _away(moves, some, used), wrong[some] == 3], axis=1)
     kinds, which = np.unique(np.concatenate([causes, state], axis=1), axis=0, return_inverse=True)
     messages = []
-    for *lost_at, in_tcp, is_away in kinds.tolist():
-        if max(lost_at) > _KNOWN:
+    for *lost_at, in_tcp, is_away, left in kinds.tolist():
+        if left:
+            messages.append(LEFT)
+        elif max(lost_at) > _KNOWN:
             messages.append(_lost(words, reasons, lost_at, bool(in_tcp)))
         else:
             messages.append(UNKNOWN if in_tcp else AWAY if is_away else OTHERS)
