@@ -201,6 +201,25 @@ def test_blocks_of_one_finding_are_in_the_order_of_the_file():
     assert (found.line, found.message.partition("; ")[2]) == (2, "2 blocks, lines 2 to 5")
 
 
+def test_the_advice_for_the_tool_that_may_be_loaded_at_the_start() -> None:
+    def advice(**initial: object) -> list[str]:
+        text = "G21 G90 G17 G94 F60\nT4 M6\nG1 X1 Y5\nT5 M6\nG1 X6\n"
+        found = read("linuxcnc", text, "", initial=InitialState(**initial)).findings  # type: ignore[arg-type]
+        return [finding.help for finding in found if finding.code == "GCO002"]
+
+    first = (
+        "if tool 4 is loaded where the program starts, state it in the cell: program_start: {tool: 4}; or write Z in"
+        " the first motion after the change"
+    )
+    assert advice() == [first]
+    assert advice(tool=4) == [
+        "state Z under program_start: in the cell, or write them in the first motion",
+        "",
+    ]
+    assert advice(tool=4, words={"Z": 1.0}) == [""]
+    assert advice(tool=3, words={"Z": 1.0}) == [first]
+
+
 def test_the_advice_for_a_reference_point_that_is_not_stated() -> None:
     def advice(text: str) -> list[str]:
         return [finding.help for finding in read("fanuc", text).findings if finding.code == "GCO013"]

@@ -62,8 +62,9 @@ CODES = define(
             meaning="The called code may move the machine and change modes.",
             consequence="Position and modes are unknown after it until they are set again.",
             action=(
-                "Put the file of the subprogram (POCKET.SPF, O1000.nc) beside the program; or write its blocks in "
-                "place of the call; or set modes and X, Y, Z after it."
+                "Put the file of the subprogram (POCKET.SPF, O1000.nc) beside the program, or one with M99 alone if it "
+                "moves and changes nothing; or write its blocks in place of the call; or set modes and X, Y, Z after "
+                "it."
             ),
             example="`M98 P1000`.",
         ),
@@ -96,7 +97,7 @@ CODES = define(
             meaning="The coordinates are rotated, scaled, mirrored, polar, or diameters.",
             consequence="Their place in the base is not followed, so the motion is not corrected.",
             action="Let the post-processor write coordinates of the base itself.",
-            example="`G68 X0 Y0 R30`.",
+            example="`G51.1 X0`.",
         ),
         "GCO011": Code(
             "info",
@@ -309,6 +310,17 @@ CODES = define(
             consequence="It is not corrected, as only the program itself is written.",
             action="Put the subprogram into the file of the program, or correct its file by itself.",
             example="`M98 P1234` with O1234.nc beside the program.",
+        ),
+        "GCO034": Code(
+            "info",
+            "tool along a plane that the program states",
+            meaning=(
+                "G53.1 and CYCLE800 bring the tool along the normal of the plane; how far it then turns about its own "
+                "axis is the machine's. It is taken as turned from the cell's orientation on the shortest way."
+            ),
+            consequence="Another turn about the tool's axis is another pose of the arm, and another correction.",
+            action="Check in a simulation that the robot holds the tool so.",
+            example="`G68.2 X0 Y0 Z0 I0 J30 K0` and `G53.1`.",
         ),
         "SIN001": Code(
             "info",

@@ -17,6 +17,7 @@ from postproc.languages.gcode.execution import Execution
 from postproc.languages.gcode.execution_flow import FlowReason
 from postproc.languages.gcode.feeds import feeds_before_units
 from postproc.languages.gcode.motions import GcodeMotions
+from postproc.languages.gcode.numbered import TOOL_CHANGE
 from postproc.languages.gcode.positions import Positions
 from postproc.languages.gcode.refusals import RefusalCollector, RefusalReason, Refusals
 from postproc.languages.gcode.rotary_refusals import refuse_rotary
@@ -64,6 +65,10 @@ class Built:
 
 
 _WRITE = "write them in the first motion"
+_LOADED = (
+    "if tool {0} is loaded where the program starts, state it in the cell: program_start: {{tool: {0}}}; or write {1}"
+    " in the first motion after the change"
+)
 NUMBERS = (*AXES, *(key(letter) for letter in "IJKR"))
 
 
@@ -159,7 +164,7 @@ def check_correctability(
     refuse(base < 0, "GCO014", "the work offset is not known, or the program itself writes it")
     refuse(tool < 0, "GCO015", "no tool is loaded, or its number or length is not known")
     refuse(force[Group.UNITS] < 0, "GCO002", "mm or inch is not known")
-    _positions(words, moves, where, collector, reasons)
+    _positions(words, moves, where, tool, collector, reasons)
     for wrong, message in ARCS.items():
         refuse(moves.arcs.wrong == wrong, "GCO012", message)
     refuse(moves.arcs.wrong == 1, "GCO012", "the start of the arc is not known")
@@ -193,9 +198,14 @@ def code_name(value: float) -> str:
 
 
 def _positions(
-    words: BlockWords, moves: GcodeMotions, where: Positions, collector: RefusalCollector, reasons: Reasons
+    words: BlockWords,
+    moves: GcodeMotions,
+    where: Positions,
+    tool: Ints,
+    collector: RefusalCollector,
+    reasons: Reasons,
 ) -> None:
-    """Refuses motions whose end is not known, by what left it unknown."""
+    """Refuses motions whose end is not known, by what left it unknown; tool (N,): numbers."""
     rows = moves.block
     lost = np.isnan(moves.end[:, :3])
     frame = np.isnan(moves.place) & ~lost
@@ -208,7 +218,10 @@ def _positions(
         keys = np.stack([causes, missing, air], axis=1)
         kinds, which = np.unique(keys, axis=0, return_inverse=True)
         messages = []
-        for cause, bits, rapid in kinds.tolist():
+        changes = words.source.column(key("M"))
+        loading = changes.block[changes.value == TOOL_CHANGE][:1]
+        first_change = int(loading[0]) if len(loading) and words.control.keeps_length else -1
+        for kind, (cause, bits, rapid) in enumerate(kinds.tolist()):
             names = ", ".join(name for name, bit in (("X", 4), ("Y", 2), ("Z", 1)) if bits & bit)
             why = (
                 "is never set before"
@@ -220,6 +233,9 @@ def _positions(
                 what = What.ORIGIN
             message = f"{names}: {why}{f' ({what})' if what else ''}"
             help_ = f"state {names} under program_start: in the cell, or {_WRITE}" if cause < 0 else ""
+            if what == What.LENGTH and cause == first_change:
+                loaded = int(tool[some[which.reshape(-1) == kind][0]])
+                help_ = _LOADED.format(loaded, names) if loaded > 0 else ""
             messages.append(RefusalReason("GCO003" if rapid else "GCO002", message, what, help_))
         collector.refuse_each(some, messages, which.reshape(-1))
     collector.refuse(

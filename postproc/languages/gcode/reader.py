@@ -33,6 +33,7 @@ from postproc.languages.gcode.control import (
     Group,
     Move,
     Once,
+    ToolAxis,
 )
 from postproc.languages.gcode.correctability import (
     Built,
@@ -187,6 +188,10 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         *refused.findings(),
         *diagnostics(document, given, rows, tool, named, settings),
     ]
+    if run.along_plane >= 0:
+        message = "the tool is taken as turned to the normal of the plane on the shortest way"
+        at = int(lines.line[run.along_plane])
+        findings.append(Finding("GCO034", message, str(document.path), at, 1))
     if coordinates:
         message = "I J K are read as coordinates: only so the radii of the arcs agree"
         arc = np.flatnonzero(built.kind == Kind.CIRC)[:1]
@@ -243,7 +248,7 @@ def _folded(words: FoldedWords, rows: Ints) -> FoldedNumbers:
 class FollowedMotions(NamedTuple):
     """The motions' columns, what others build on, the frames of the program, what its orientation words mean, and why
     motions are refused; differing_radii: arcs whose radii at start and end differ; levels (K,): blocks that state the
-    level to which a drill cycle goes back."""
+    level to which a drill cycle goes back; along_plane: the first block that brings the tool along a plane, -1."""
 
     columns: FilledRows
     built: Built
@@ -252,6 +257,7 @@ class FollowedMotions(NamedTuple):
     collector: RefusalCollector
     differing_radii: int
     levels: Ints
+    along_plane: int
 
 
 def _followed(
@@ -314,8 +320,16 @@ def _followed(
         np.array([frame.shift[:3] for frame in trace.frames]),
     )
     levels = np.unique(ends.source[np.isfinite(drills.depth) & (ends.source >= 0)])
+    along = [number for number, frame in enumerate(trace.frames) if frame.tool == ToolAxis.NORMAL]
     return FollowedMotions(
-        found, built, frames, tuple(tool_orientations.orientations), collector, differing, levels
+        found,
+        built,
+        frames,
+        tuple(tool_orientations.orientations),
+        collector,
+        differing,
+        levels,
+        int(trace.started(np.array(along[:1], np.int64))[0]) if along else -1,
     )
 
 
