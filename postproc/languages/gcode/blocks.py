@@ -106,7 +106,7 @@ class BlockWords:
         codes = self.words(key("G")).value
         if np.isin(codes, (90.1, 91.1)).any():
             return None
-        return replace(self, modal=self.modal.holding(Group.ARCS, 1))
+        return replace(self, modal=self.modal.with_value(Group.ARCS, 1))
 
     def part(self, start: int, stop: int) -> BlockWords:
         """The blocks start .. stop - 1 of a whole program."""

@@ -89,7 +89,7 @@ class Modal:
         mask[self.unknown_codes.block] = True
         return mask
 
-    def holding(self, group: Group, value: int) -> Modal:
+    def with_value(self, group: Group, value: int) -> Modal:
         """The same with ``value`` of ``group`` in force all along."""
         force = {**self.force, group: everywhere(value, len(self.once), np.int8)}
         return replace(self, force=force, ahead={**self.ahead, group: value})

@@ -98,7 +98,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     execution = replace(execution, source=source)
     in_force = modal(execution, control, settings.initial.base)
     if settings.options.get(ROTARY_WORDS) == AT_TIP:
-        in_force = in_force.holding(Group.TCP, 1)
+        in_force = in_force.with_value(Group.TCP, 1)
     given = blocks(source, in_force, control, integers)
     rows = np.flatnonzero(given.motion).astype(np.int32)
     offset = work_offsets(given)
