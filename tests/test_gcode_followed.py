@@ -201,6 +201,31 @@ def test_blocks_of_one_finding_are_in_the_order_of_the_file():
     assert (found.line, found.message.partition("; ")[2]) == (2, "2 blocks, lines 2 to 5")
 
 
+FURTHER = "G1 X1 Y2 Z3 Y2=-300.4 U5\nG1 X2 Y2=-290\nG1 X3\nG91 G1 X1 U1\n"
+
+
+def test_words_of_external_axes_that_the_cell_states() -> None:
+    """In place of E1 and E2; what is not stated is refused as before, and so is E1 where another word is it."""
+    path = read("sinumerik", FURTHER, external_words={"Y2": 0, "U": 1}).toolpath
+    assert not path.constraints.refused
+    np.testing.assert_array_equal(path.external[1:4, :2], [[-300.4, 5], [-290, 5], [-290, 5]])
+    same = read("sinumerik", FURTHER.replace("Y2=", "E1=").replace("U", "E2=")).toolpath
+    np.testing.assert_array_equal(path.external, same.external)
+    assert {2, 3} <= path.constraints.no_insert_before.keys() | {3}
+    for stated, name in (
+        ({"Y2": 0}, "U (line 5)"),
+        ({"U": 0}, "Y2 (line 5)"),
+        ({}, "U (line 5), Y2 (line 5)"),
+    ):
+        refused = read("sinumerik", FURTHER, external_words=stated).toolpath.constraints.refused
+        assert [found.code for found in refused.values()] == ["GCO026"] * 5
+        assert name in refused[1].message
+    advice = read("sinumerik", FURTHER).toolpath.constraints.refused[1].advice
+    assert "external_axes: {E1: {kind: fixed, word: U}}" in advice
+    moved = read("sinumerik", "G1 X1 E1=5\n", external_words={"Y2": 0}).toolpath.constraints.refused
+    assert "E1 (line 5)" in moved[1].message
+
+
 def test_the_advice_for_the_tool_that_may_be_loaded_at_the_start() -> None:
     def advice(**initial: object) -> list[str]:
         text = "G21 G90 G17 G94 F60\nT4 M6\nG1 X1 Y5\nT5 M6\nG1 X6\n"

@@ -247,7 +247,8 @@ CODES = define(
                 "motions are not corrected."
             ),
             action=(
-                "Let the post-processor name what carries robot or part E1 to E6, and declare it in the cell."
+                "State in the cell what carries robot or part, and which word names it (external_axes: with word:); or "
+                "let the post-processor name it E1 to E6."
             ),
             example="`G1 X10 W50`.",
         ),

@@ -52,7 +52,7 @@ from postproc.languages.gcode.drill_cycles import (
     with_holes,
 )
 from postproc.languages.gcode.execution import FoldedWords, execute
-from postproc.languages.gcode.external_axes import external_axes, moves_external, others_move
+from postproc.languages.gcode.external_axes import addresses, external_axes, moves_external, others_move
 from postproc.languages.gcode.feeds import Feeds, blend_tolerances, blends, with_stops
 from postproc.languages.gcode.frame_changes import frame_blocks, frame_change
 from postproc.languages.gcode.integer_words import integer_words
@@ -131,11 +131,16 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     )
     lines = source.blocks
     line, start = lines.line[rows], lines.start[rows]
-    external = external_axes(given, rows)
-    if control.further and (others := others_move(given)).any():
-        where = int(lines.line[np.argmax(others)])
-        message = f"an axis that is none of X, Y, Z, E1 to E6 and the rotary ones moves (line {where})"
-        collector.refuse(np.ones(len(rows), np.bool_), "GCO026", message)
+    axes = addresses(settings.external_words if control.further else {})
+    external = external_axes(given, rows, axes)
+    if control.further and (others := others_move(given, axes)):
+        moving = ", ".join(f"{name} (line {lines.line[block]})" for name, block in sorted(others.items())[:6])
+        message = f"axes move that are none of X, Y, Z, E1 to E6 and the rotary ones: {moving}"
+        first = min((name for name in others if name[0] not in "ABCE"), default="")
+        stated = f"external_axes: {{E1: {{kind: fixed, word: {first}}}}}"
+        help_ = f"state in the cell what they carry: {stated} where it moves neither robot nor part; or kind: track"
+        help_ = help_ if first else ""
+        collector.refuse(np.ones(len(rows), np.bool_), "GCO026", message, help_)
     refused = collector.done(document, line, start, lines.first[rows])
     frame_of_base, frame_of_tool, cell_frames = references(base, tool[rows], line, offset.stated)
     said = remarks(document, source, rows, execution.order is None, foreign)
