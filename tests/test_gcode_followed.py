@@ -201,6 +201,28 @@ def test_blocks_of_one_finding_are_in_the_order_of_the_file():
     assert (found.line, found.message.partition("; ")[2]) == (2, "2 blocks, lines 2 to 5")
 
 
+def test_the_advice_after_a_call_that_is_not_read() -> None:
+    """Its line, where the offset is not known since; followed, an empty subprogram leaves all as it is."""
+
+    def offsets(text: str, **siblings: object) -> list[tuple[str, str]]:
+        found = read("fanuc", text, **siblings).findings
+        return [(one.message, one.help) for one in found if one.code == "GCO014"]
+
+    text = "G65 P8000 X1.\nG1 X1. Y1. Z1.\nX2.\nG54\nG1 X1. Y1. Z1.\nM98 P7\nG1 X1. Y1. Z1.\n"
+    said = "the work offset is not known since line {}, which calls code that is not read"
+    first, second = offsets(text)
+    assert first[0].startswith(said.format(6))
+    assert second[0] == said.format(11)
+    assert "put the file that line 6 calls beside the program, or one with M99 alone" in first[1]
+    empty = tuple(Document(Path(f"O{name}.nc"), f"O{name}\nM99\n".encode()) for name in (8000, 7))
+    assert not offsets(text, siblings=empty)
+    # another cause than the call
+    other = offsets("G65 P8000\nG54\nG1 X1. Y1. Z1.\nG10 L2 P1 X#500\nG1 X1. Y1. Z1.\n")
+    assert [message for message, _ in other] == [
+        "the work offset is not known, or the program itself writes it"
+    ]
+
+
 FURTHER = "G1 X1 Y2 Z3 Y2=-300.4 U5\nG1 X2 Y2=-290\nG1 X3\nG91 G1 X1 U1\n"
 
 

@@ -161,6 +161,7 @@ def check_correctability(
         "the work offset of this rapid is not known, or the program itself writes it",
     )
     refuse(air & (tool < 0), "GCO003", "this rapid has no tool, or its number or length is not known")
+    _offsets_lost(words, rows[(base < 0) & ~air], np.flatnonzero((base < 0) & ~air), collector)
     refuse(base < 0, "GCO014", "the work offset is not known, or the program itself writes it")
     refuse(tool < 0, "GCO015", "no tool is loaded, or its number or length is not known")
     refuse(force[Group.UNITS] < 0, "GCO002", "mm or inch is not known")
@@ -175,6 +176,30 @@ def check_correctability(
         "it is not known whether I J K are coordinates or differences",
     )
     refuse_rotary(words, moves, where, reasons, collector)
+
+
+def _offsets_lost(words: BlockWords, blocks: Ints, rows: Ints, collector: RefusalCollector) -> None:
+    """Refuses motions ``rows`` (K,) in ``blocks`` (K,) whose work offset is not known since a call that is not read."""
+    calls = np.flatnonzero(words.modal.flow.forget)
+    at = np.searchsorted(calls, blocks, side="right") - 1
+    if not (at >= 0).any():
+        return
+    known = np.where(words.modal.force[Group.OFFSET] >= 0, np.arange(len(words)), -1)
+    some = (at >= 0) & (np.maximum.accumulate(known)[blocks] < calls[at])
+    lines = words.source.blocks.line
+    if not some.any():
+        return
+    which, number = np.unique(at[some], return_inverse=True)
+    reasons = []
+    for call in calls[which].tolist():
+        line = lines[words.start + call - 1]
+        message = f"the work offset is not known since line {line}, which calls code that is not read"
+        help_ = (
+            f"put the file that line {line} calls beside the program, or one with M99 alone if it moves and changes"
+            " nothing; or select the offset again after it (G54)"
+        )
+        reasons.append(RefusalReason("GCO014", message, f"call {line}", help_))
+    collector.refuse_each(rows[some], reasons, number.reshape(-1))
 
 
 def _is_arc(move: Ints) -> Bools:
