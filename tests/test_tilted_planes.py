@@ -243,6 +243,22 @@ def ends(name: str, text: str) -> list[str]:
             ["0 0 0", "1 -3 2", "1 -3 2*", "1 2 3*", "1 2 3", "4 2 3"],
         ),
         ("G53.1\nG1 X1. Y2. Z3.\n", ["?*"]),
+        # in a tilted plane an axis of the machine, or the tool's length, moves several coordinates
+        (
+            "G68.2 X0. Y0. Z0. I0. J90. K0.\nG1 X1. Y2. Z3.\nG53 Z0.\nG1 X1. Z3.\nY2.\n",
+            ["1 -3 2", "?*", "?*", "1 -3 2"],
+        ),
+        ("G68 X0. Y0. R90.\nG1 X1. Y2. Z3.\nG28 X0.\nG1 X1. Z3.\nY2.\n", ["-2 1 3", "?*", "?*", "-2 1 3"]),
+        (
+            "G68.2 X0. Y0. Z0. I0. J90. K0.\nG1 X1. Y2. Z3.\nG43 H2\nG1 X1. Z3.\nY2.\n",
+            ["1 -3 2", "?*", "1 -3 2"],
+        ),
+        (
+            "G68.2 X0. Y0. Z0. I0. J90. K0.\nG53.1\nG1 X1. Y2. Z3.\nG43 H2\nG1 X1. Z3.\nX2.\n",
+            ["1 -3 2", "1 -3 2", "2 -3 2"],
+        ),
+        # a TCP mode without words of an orientation leaves the tool along the plane, which is not read
+        ("G68.2 X0. Y0. Z0. I0. J90. K0.\nG53.1\nG43.4 H1\nG1 X1. Y2. Z3.\n", ["1 -3 2*"]),
         ("G68 X0. Y0. R90.\nG53.1\nG1 X1. Y2. Z3.\n", ["?*"]),
         ("G68.2 P1 X0. Y0. Z0. I0. J90. K0.\nG1 X1. Y2. Z3.\n", ["?*"]),
         ("G68.2 X0. Y0. Z0.\nG1 X1. Y2. Z3.\n", ["?*"]),
@@ -273,6 +289,7 @@ def test_planes_that_are_read_of_a_sinumerik(changed: dict[str, object], known: 
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
+        ("G1 X1 Y2 Z3\nSUPA G0 Z0\nG1 X1 Z3\n", ["1 -3 2", "?*", "?*"]), ("TRAORI\nG1 X1 Y2 Z3\n", ["1 -3 2*"]),
         ("TRANS X1\nG1 X1 Y2 Z3\n", ["?*"]), ("CYCLE800()\nG1 X1 Y2 Z3\n", ["?*"]),
         ('CYCLE800(1,"TC",0,57,0,0,0,0,0,0,0,0,0,1,100,1)\nG1 X1 Y2 Z3\n', ["1 2 3"]),
         # without a direction no axis moves, and the tool stays along the plane

@@ -396,4 +396,7 @@ def frame_events(
         # Along the tool, which only rotary axes away from 0 can lay elsewhere than along Z.
         leave(np.arange(6) == 2, lengths, What.LENGTH)
         leave(linear, lengths & away, What.LENGTH)
-    return AxisWords(np.where(target, value, 0.0), target & ~relative, relative, lost, left)
+    by_machine = words.motion & modal.has(Once.HOME, Once.MACHINE)
+    return AxisWords(
+        np.where(target, value, 0.0), target & ~relative, relative, lost, left, by_machine, lengths
+    )

@@ -144,6 +144,7 @@ def swivelled(event: Event, arguments: Sequence[str], values: Sequence[float]) -
         or values[13] not in (-1.0, 1.0)
         or event.plane
         or plane not in (0.0, 1.0)
+        or arguments[1].count('"') not in (0, 2)  # a comma in a name
         or arguments[1].strip("\"' \t") == "0"
     ):
         return None

@@ -168,7 +168,9 @@ class ToolOrientations:
         result.wrong[normal] = np.where(turned_since[normal], 1, 0)
         away = ~tcp & (tool == ToolAxis.UNKNOWN) & ~self._used.any()
         result.wrong[away] = 3
-        result.rotation[away | (normal & turned_since)] = np.nan
+        unsaid = tcp & (tool != ToolAxis.STATED) & self._none
+        result.wrong[unsaid] = 2
+        result.rotation[away | unsaid | (normal & turned_since)] = np.nan
         for frame in np.unique(where.frame[rows[normal & ~turned_since]]).tolist():
             here = normal & ~turned_since & (where.frame[rows] == frame)
             if self._turned is not None:
