@@ -297,7 +297,7 @@ def test_spindle_axes(tmp_path, word, axis):
             "touch_points.2: the 4 points are on one line",
         ),
         ("robot: r\ndialect: {integer_words: inch}\n", "YML004", 2, "not one of mm, um"),
-        ("robot: r\ndialect: {rotary_words: table}\n", "YML004", 2, "not one of tip, part"),
+        ("robot: r\ndialect: {rotary_words: table}\n", "YML004", 2, "not one of tip, part, m428"),
         (
             "robot: r\nexternal_axes:\n  E1: {kind: fixed, word: A3}\n",
             "YML004",

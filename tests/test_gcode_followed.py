@@ -317,6 +317,27 @@ def test_rotary_words_at_the_tip_are_those_of_a_tcp_mode(name: str) -> None:
     assert stated.constraints.orientation_programmed.any()
     refused = read(name, ROTARY).toolpath.constraints.refused
     assert len(refused) >= 4
+    # other kinematics in between: what the words mean is not known
+    switched = read(name, ROTARY + "M429\n", options={"rotary_words": "tip"}).toolpath.constraints.refused
+    assert list(switched) == list(refused)
+
+
+@pytest.mark.parametrize(
+    ("text", "known"),
+    [
+        ("M428\n{}", True), ("M428\n{}M429\n", True), ("{}M428\n", False), ("M428\nM429\n{}", False),
+        ("M428\nM430\n{}", False), ("/M428\n{}", False), ("{}", False),
+    ],
+)  # fmt: skip
+def test_codes_that_switch_the_kinematics(text: str, known: bool) -> None:
+    """M428 and M429 of LinuxCNC's configurations with five axes, where the cell states that they are that."""
+    path = read("linuxcnc", text.format(ROTARY), options={"rotary_words": "m428"}).toolpath
+    tip = read("linuxcnc", ROTARY, options={"rotary_words": "tip"}).toolpath
+    plain = read("linuxcnc", ROTARY).toolpath
+    for one, other in zip(_columns(path), _columns(tip if known else plain), strict=True):
+        np.testing.assert_array_equal(one[1:], other[1:])
+    if not known and "M428" in text:
+        assert any("rotary_words: m428" in one.advice for one in path.constraints.refused.values())
 
 
 def test_a_tcp_mode_means_the_same_where_rotary_words_turn_the_part() -> None:

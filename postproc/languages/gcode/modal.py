@@ -91,8 +91,11 @@ class Modal:
 
     def with_value(self, group: Group, value: int) -> Modal:
         """The same with ``value`` of ``group`` in force all along."""
-        force = {**self.force, group: everywhere(value, len(self.once), np.int8)}
-        return replace(self, force=force, ahead={**self.ahead, group: value})
+        return self.with_values(group, everywhere(value, len(self.once), np.int8), value)
+
+    def with_values(self, group: Group, values: Ints, ahead: int) -> Modal:
+        """The same with ``values`` (B,) of ``group`` in force, ``ahead`` ahead of the first block."""
+        return replace(self, force={**self.force, group: values}, ahead={**self.ahead, group: ahead})
 
     def switched(self, group: Group) -> Bools:
         """(B,) blocks in which another value is in force than in the block ahead."""

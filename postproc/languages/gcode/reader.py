@@ -25,7 +25,7 @@ from postproc.languages.gcode.blocks import (
     frame_events,
     tilted,
 )
-from postproc.languages.gcode.cell_options import AT_TIP, INTEGER_WORDS, ROTARY_WORDS, TURN_PART
+from postproc.languages.gcode.cell_options import INTEGER_WORDS, ROTARY_WORDS, TURN_PART
 from postproc.languages.gcode.comments import remarks
 from postproc.languages.gcode.control import (
     Control,
@@ -65,6 +65,7 @@ from postproc.languages.gcode.positions import Positions, Trace
 from postproc.languages.gcode.reference_points import reference_angles
 from postproc.languages.gcode.refusals import RefusalCollector
 from postproc.languages.gcode.source_map import STATE, FoldedNumbers, GcodeSourceMap
+from postproc.languages.gcode.stated_kinematics import with_stated_kinematics
 from postproc.languages.gcode.subprogram_files import JoinedText, file_name, join
 from postproc.languages.gcode.tool_orientation import ToolOrientations
 from postproc.languages.gcode.words import key
@@ -97,8 +98,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     source, foreign = joined.at_the_calls(execution.source)
     execution = replace(execution, source=source)
     in_force = modal(execution, control, settings.initial.base)
-    if settings.options.get(ROTARY_WORDS) == AT_TIP:
-        in_force = in_force.with_value(Group.TCP, 1)
+    in_force = with_stated_kinematics(source, in_force, settings.options.get(ROTARY_WORDS, ""))
     given = blocks(source, in_force, control, integers)
     rows = np.flatnonzero(given.motion).astype(np.int32)
     offset = work_offsets(given)

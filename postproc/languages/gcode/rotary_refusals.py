@@ -6,7 +6,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Ints
 from postproc.languages.gcode.blocks import AXES, BlockWords, Reasons, What
-from postproc.languages.gcode.cell_options import AT_TIP, ROTARY_WORDS, TURN_PART
+from postproc.languages.gcode.cell_options import AT_TIP, ROTARY_WORDS, SWITCHED, TIP_ON_M, TURN_PART
 from postproc.languages.gcode.control import Group
 from postproc.languages.gcode.motions import GcodeMotions
 from postproc.languages.gcode.positions import Positions
@@ -19,6 +19,10 @@ AWAY = RefusalReason(
     "away",
     f"state in the cell what A, B, C do: dialect: {{{ROTARY_WORDS}: {TURN_PART}}} if they turn the part and X, Y, Z do"
     f" not turn with it, {{{ROTARY_WORDS}: {AT_TIP}}} if X, Y, Z are the tool's tip",
+)
+BY_CODE = AWAY._replace(
+    help=f"if M{TIP_ON_M} makes X, Y, Z the tool's tip and M{TIP_ON_M + 1} ends that, state it in the cell: dialect:"
+    f" {{{ROTARY_WORDS}: {SWITCHED}}}"
 )
 OTHERS = RefusalReason(
     "GCO013", "the orientation is stated by words that only a TCP mode reads, and none is active", "others"
@@ -53,13 +57,14 @@ def refuse_rotary(
     state = np.stack([tcp, ~tcp & _away(moves, some, used), wrong[some] == 3], axis=1)
     kinds, which = np.unique(np.concatenate([causes, state], axis=1), axis=0, return_inverse=True)
     messages = []
+    away = BY_CODE if (words.source.column(key("M")).value == TIP_ON_M).any() else AWAY
     for *lost_at, in_tcp, is_away, left in kinds.tolist():
         if left:
             messages.append(LEFT)
         elif max(lost_at) > _KNOWN:
             messages.append(_lost(words, reasons, lost_at, bool(in_tcp)))
         else:
-            messages.append(UNKNOWN if in_tcp else AWAY if is_away else OTHERS)
+            messages.append(UNKNOWN if in_tcp else away if is_away else OTHERS)
     collector.refuse_each(some, messages, which.reshape(-1))
 
 
