@@ -209,7 +209,7 @@ def test_a_compensator_is_told_from_a_stiffness_that_varies():
     (foil,) = decoys(base.model, campaign, found[0])
     assert (foil.name, foil.joint) == ("joint_compliance", "A2")
     assert "varying with its angle" in foil.label
-    other = next(c for c in candidates(campaign, model, campaign.start()) if c.name == "backlash")
+    other = next(c for c in candidates(campaign, model, campaign.start()) if c.name == "tool_compliance")
     assert not decoys(base.model, campaign, other)
 
 
@@ -271,7 +271,9 @@ def test_a_wave_of_another_order_is_no_harmonic():
 )
 def test_a_faint_pattern_leaves_a_name_as_it_is(monkeypatch, share, known, more):
     monkeypatch.setattr(verdict, "reduced_chi2_of", lambda search, last: (1.0, False))
-    search = SimpleNamespace(linear=SimpleNamespace(problem=SimpleNamespace(known=known)), explained=None)
+    search = SimpleNamespace(
+        linear=SimpleNamespace(problem=SimpleNamespace(known=known)), explained=None, chosen=()
+    )
     assert verdict.more_remains(search, [ResidualPattern("A2 over its angle", "", share)]) == more
     assert not verdict.more_remains(search, [])
 
