@@ -20,7 +20,6 @@ from postproc.effects import (
 )
 from postproc.effects.effect import column
 from postproc.effects.joint_offset import JointOffset
-from postproc.effects.joint_stiffening import JointStiffening
 from postproc.effects.link_compliance import LinkCompliance
 from postproc.effects.link_geometry import LinkGeometry
 from postproc.effects.thermal_growth import ThermalGrowth
@@ -136,9 +135,10 @@ class LoadedPlay(AlternativeForm, ComplianceLaw):
 
 
 class BentCompliance(AlternativeForm, ComplianceLaw):
-    """theta = v tau (abs(tau) / load)^(power - 1) of the coordinates of a joint or, with the power 1, v sign(tau)
+    """theta = v tau (abs(tau) / load)^(power - 1) of the tilts of a joint or, with the power 1, v sign(tau)
     max(0, abs(tau) - load): what gives otherwise than in proportion, as teeth do, or what has clearance."""
 
+    name = "link_compliance"
     family = "elastic"
     about = "a deflection out of proportion to the load of"
 
@@ -148,20 +148,18 @@ class BentCompliance(AlternativeForm, ComplianceLaw):
         joint: int = 0,
         power: int = 2,
         load: float = 1000.0,
-        across: bool = True,
     ) -> None:
         at = joints[joint].name
-        self.name = "link_compliance" if across else "joint_stiffening"
         self.joint, self.power, self.load = joint, power, load
-        self.coordinates = tuple(f"{at}.r{axis}" for axis in "xy") if across else ()
+        self.coordinates = tuple(f"{at}.r{axis}" for axis in "xy")
         self.parameters = tuple(
             Parameter(f"v{axis}", "rad/(N m)", 0.0, source="next term of any smooth law", joint=at)
-            for axis in ("xy" if across else "z")
+            for axis in "xy"
         )
 
     def rows(self, chain: Chain) -> list[int]:
         """Where the coordinates are in the chain."""
-        return [chain.index[name] for name in self.coordinates] or [chain.motor_rows[self.joint]]
+        return [chain.index[name] for name in self.coordinates]
 
     def described(self) -> dict[str, object]:
         return {"varies": f"with its load to the power {self.power}", "from": round(self.load, 3)}
@@ -238,10 +236,9 @@ def decoys(model: StiffnessModel, campaign: Campaign, mine: Candidate) -> list[C
         return []
     if mine.effect.by_direction:
         return [_decoy(model, q, LoadedPlay(joints, joint), mine.joint)]
-    if mine.name in (LinkCompliance.name, JointStiffening.name):
-        across = mine.name == LinkCompliance.name
-        largest = _largest_load(campaign, model, BentCompliance(joints, joint, across=across))
-        forms = [BentCompliance(joints, joint, n, share * largest, across) for n, share in BENT]
+    if mine.name == LinkCompliance.name:
+        largest = _largest_load(campaign, model, BentCompliance(joints, joint))
+        forms = [BentCompliance(joints, joint, n, share * largest) for n, share in BENT]
         return [_decoy(model, q, form, mine.joint) for form in forms]
     if mine.name not in HAS_DECOYS:
         return []
