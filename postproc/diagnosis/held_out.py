@@ -140,8 +140,8 @@ def _misfit(matrix: Floats, target: Floats, part: Ints, variance: float) -> tupl
         gram = np.eye(b.shape[1]) + b.T @ b
         shared = np.linalg.solve(gram, b.T @ away)
         own = (away - b @ shared) ** 2 / variance
-        together = min(shared @ shared / variance, OUTLIER_LIMIT**2 * len(shared))
-        squares.append(float(np.minimum(own, OUTLIER_LIMIT**2).sum()) + float(together))
+        together = min(float(shared @ shared) / variance, OUTLIER_LIMIT**2 * len(shared))
+        squares.append(float(np.minimum(own, OUTLIER_LIMIT**2).sum()) + together)
         logarithms += float(len(own) * np.log(variance) + np.linalg.slogdet(gram)[1])
     return np.array(squares), logarithms
 
