@@ -10,7 +10,7 @@ from blind.cases import cases, made
 from measured import MARKERS
 from test_diagnosis import campaign_of, fitted, stated
 
-from postproc.diagnosis.accidents import are_accidents, loaded_joint, wild_readings
+from postproc.diagnosis.accidents import are_accidents, far_readings, loaded_joint
 from postproc.diagnosis.decoys import BentCompliance, LeaningCompliance, LoadedPlay, decoys
 from postproc.diagnosis.diagnosis import diagnose
 from postproc.diagnosis.held_out import left_out_variance
@@ -110,12 +110,12 @@ def test_what_is_off_under_the_largest_loads_alone_is_no_accident(tmp_path):
     order = np.argsort(moments())
     most = len(MARKERS) * order[-4:]
     final = struck(most)
-    wild = wild_readings(final)
+    wild = far_readings(final)
     assert sorted(one.row for one in wild) == sorted(most)
     assert are_accidents(final.campaign, wild)
     assert loaded_joint(final, wild) == "A1"
     anywhere = struck(len(MARKERS) * order[[3, 20, 41, 55]])
-    assert loaded_joint(anywhere, wild_readings(anywhere)) == ""
+    assert loaded_joint(anywhere, far_readings(anywhere)) == ""
     file = tmp_path / "loads.csv"
     file.write_bytes(measurements_csv(final.campaign.readings))
     done = diagnose_robot(DiagnoseRequest(data=(file,), robot="kuka_kr270"))
@@ -126,7 +126,7 @@ def test_what_is_off_under_the_largest_loads_alone_is_no_accident(tmp_path):
 def test_readings_far_off_that_are_too_many_for_accidents_leave_more_unexplained(tmp_path):
     rows = np.arange(0, 180, 15)
     final = struck(rows)
-    assert not are_accidents(final.campaign, wild_readings(final))
+    assert not are_accidents(final.campaign, far_readings(final))
     file = tmp_path / "loads.csv"
     file.write_bytes(measurements_csv(final.campaign.readings))
     done = diagnose_robot(DiagnoseRequest(data=(file,), robot="kuka_kr270"))

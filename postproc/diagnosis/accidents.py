@@ -19,7 +19,7 @@ CHANCE = 0.001
 """Probability that accidents fall among the largest loads on any joint by chance."""
 
 
-def wild_readings(final: Fit) -> tuple[Outlier, ...]:
+def far_readings(final: Fit) -> tuple[Outlier, ...]:
     """Readings that no fit with this scatter would leave so far off, worst first."""
     length = lengths(final.point.residual, final.plain_weights)
     if length.max(initial=0.0) < 0.5 * WILD * spread_of(length, final.noise.known):
@@ -28,16 +28,16 @@ def wild_readings(final: Fit) -> tuple[Outlier, ...]:
     return tuple(one for one in detected if one.sigmas > WILD)
 
 
-def are_accidents(campaign: Campaign, wild: Sequence[Outlier]) -> bool:
-    """Whether ``wild`` readings are as few as accidents are: one strikes one reading, or one pose; where several poses
+def are_accidents(campaign: Campaign, far_off: Sequence[Outlier]) -> bool:
+    """Whether readings ``far_off`` are as few as accidents are: one strikes one reading, or one pose; where several poses
     are off as a whole, the arm was there."""
-    return len(wild) <= FEW * len(campaign) and len(poses_off(campaign, wild)) <= 1
+    return len(far_off) <= FEW * len(campaign) and len(poses_off(campaign, far_off)) <= 1
 
 
 def gross_errors(final: Fit) -> tuple[Outlier, ...]:
     """Readings so far off that they would decide; none where there are so many that they are no accidents."""
-    wild = wild_readings(final)
-    return wild if are_accidents(final.campaign, wild) else ()
+    far_off = far_readings(final)
+    return far_off if are_accidents(final.campaign, far_off) else ()
 
 
 def poses_off(campaign: Campaign, several: Sequence[Outlier]) -> Ints:

@@ -11,7 +11,7 @@ from postproc import __version__
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import place
 from postproc.base.units import MM
-from postproc.diagnosis.accidents import are_accidents, loaded_joint, poses_off, wild_readings
+from postproc.diagnosis.accidents import are_accidents, far_readings, loaded_joint, poses_off
 from postproc.diagnosis.approach_sides import diagnose_sides
 from postproc.diagnosis.diagnosis import Diagnosis, diagnose
 from postproc.diagnosis.search import model_unknowns
@@ -70,7 +70,7 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
     findings = [*measured.findings, *check_fit(campaign, model, own)]
     diagnosis, sides = diagnose_sides(campaign, model, stage)
     findings += sides
-    struck, wild = campaign_of(diagnosis), wild_readings(diagnosis.final)
+    struck, wild = campaign_of(diagnosis), far_readings(diagnosis.final)
     if wild and not are_accidents(struck, wild):
         diagnosis = _beside_others(diagnosis)
     elif wild:
