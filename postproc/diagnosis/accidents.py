@@ -29,8 +29,8 @@ def far_readings(final: Fit) -> tuple[Outlier, ...]:
 
 
 def are_accidents(campaign: Campaign, far_off: Sequence[Outlier]) -> bool:
-    """Whether readings ``far_off`` are as few as accidents are: one strikes one reading, or one pose; where several poses
-    are off as a whole, the arm was there."""
+    """Whether readings ``far_off`` are as few as accidents are: one strikes one reading, or one pose; where several
+    poses are off as a whole, the arm was there."""
     return len(far_off) <= FEW * len(campaign) and len(poses_off(campaign, far_off)) <= 1
 
 
