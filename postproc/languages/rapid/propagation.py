@@ -60,6 +60,9 @@ MOST_RUNS = 8
 """Runs of main after each other until all of them start with the same."""
 DEEPEST = 12
 """Calls in each other."""
+MOST_IN_RUN = 10_000
+"""Statements of a run of the program, with eight more for each of the file, after which calls are not followed any
+more: what routines do that call others several times grows with a power of their number."""
 
 
 def _length(statement: object) -> int:
@@ -108,7 +111,10 @@ class Propagation:
         self.preceding: dict[int, Remark | Varying | None] = {}
         self.rows = 0
         self.waited: set[Source] = set()
-        self._steps = MOST_STEPS + 4 * sum(_length(one) for r in module.routines for one in walk(r.body))
+        statements = sum(_length(one) for r in module.routines for one in walk(r.body))
+        self._steps = MOST_STEPS + 4 * statements
+        self._in_run = MOST_IN_RUN + 8 * statements
+        self._last_called = 0  # at as many steps left calls are not followed any more
         self._runner = FlowRunner(self._after, lambda: len(self._names.aliased))
 
     def run(self) -> None:
@@ -145,7 +151,7 @@ class Propagation:
             state.displaced |= {b"a trap or an error handler"}
         if is_main:
             self._start_again(routine, state)
-        self._runner.start()
+        self._start()
         end = self._routine(routine, state, True)
         if end is not None:
             self._leave_place(end)
@@ -156,7 +162,7 @@ class Propagation:
         if not (any(state.values.items()) or changes.names):
             return
         for _ in range(0 if self._restarts else MOST_RUNS):
-            self._runner.start()
+            self._start()
             after = self._routine(main, state.copy(), False)
             again = state.copy()
             if after is not None:
@@ -171,6 +177,11 @@ class Propagation:
             state.take(again)
         self._forget_all(self.usage.assigned, state)
         changes._replace(speaks=False).lose(state, b"an earlier run")
+
+    def _start(self) -> None:
+        """Starts a run of the program."""
+        self._runner.start()
+        self._last_called = self._steps - self._in_run
 
     def _lose_effects(self, name: bytes, state: ProgramState) -> None:
         """What calls of a routine may have done, or a part of it."""
@@ -363,7 +374,8 @@ class Propagation:
 
     def _call(self, routine: RapidRoutine, step: Instruction, state: ProgramState) -> None:
         """Runs a routine of the file with its arguments."""
-        if routine in self._names.active or len(self._names.active) >= DEEPEST or self.is_unclear(routine):
+        deep = len(self._names.active) >= DEEPEST or self._steps < self._last_called
+        if deep or routine in self._names.active or self.is_unclear(routine):
             self._again |= self._effects.of(routine.name).routines
             self._unread_call(step, state, moves=True)
             self._lose_effects(routine.name, state)
