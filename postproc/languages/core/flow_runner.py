@@ -40,6 +40,7 @@ class FlowState(Protocol):
 
 
 State = TypeVar("State", bound=FlowState)
+_Stable = tuple[dict[int, State], dict[int, list[tuple[int, State]]]]
 Graph = TypeVar("Graph", bound=FlowGraph[Any, Any, Any])
 
 
@@ -55,6 +56,7 @@ class FlowRunner(Generic[Graph, State]):
         self._run_block, self._version = after, version
         self.recording = False
         self._known: dict[tuple[int, int], list[tuple[State, int, list[tuple[int, State]]]]] = {}
+        self._stable_known: dict[tuple[int, int, int], list[tuple[State, int, _Stable[State]]]] = {}
         self._left = 0  # statements and blocks that can still be run in loops
         self._deep = 0  # loops in each other
         self._unknown = 0  # loops that are run until nothing changes
@@ -188,6 +190,26 @@ class FlowRunner(Generic[Graph, State]):
 
     def _repeated(self, graph: Graph, first: int, stop: int, state: State, ends: list[State]) -> State | None:
         """As ``_region``, of blocks that go back in any way: each with what holds on all paths that lead to it."""
+        starts, outside = self._stable(graph, first, stop, state)
+        before = self.recording
+        leaving: list[State] = []
+        for at in sorted(starts):
+            led = self._after(graph, at, starts[at].copy()) if before else outside[at]
+            for there, after in led:
+                if there == -1:
+                    ends.append(after.copy())
+                elif there >= 0 and not first <= there < stop:
+                    leaving.append(after.copy())
+        return _joined(leaving, graph.meetings[first, stop])
+
+    def _stable(self, graph: Graph, first: int, stop: int, state: State) -> _Stable[State]:
+        """What holds before the blocks from ``first`` to before ``stop`` once nothing changes any more, and with what
+        each leaves for others; remembered, as a loop around them often comes with the same again."""
+        runs = self._stable_known.setdefault((id(graph), first, stop), [])
+        version = self._version()
+        for known_state, known_version, found in runs:
+            if known_version == version and known_state.is_same(state):
+                return found
         before, self.recording = self.recording, False
         starts, pending, waiting = {first: state.copy()}, [first], {first}
         outside: dict[int, list[tuple[int, State]]] = {}
@@ -207,15 +229,9 @@ class FlowRunner(Generic[Graph, State]):
                     waiting.add(there)
                     heappush(pending, there)
         self.recording = before
-        leaving: list[State] = []
-        for at in sorted(starts):
-            led = self._after(graph, at, starts[at].copy()) if before else outside[at]
-            for there, after in led:
-                if there == -1:
-                    ends.append(after.copy())
-                elif there >= 0 and not first <= there < stop:
-                    leaving.append(after.copy())
-        return _joined(leaving, graph.meetings[first, stop])
+        runs.append((state.copy(), self._version(), (starts, outside)))
+        del runs[:-KEPT]
+        return starts, outside
 
 
 def _joined(states: list[State], meeting: Meeting) -> State | None:

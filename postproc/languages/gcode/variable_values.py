@@ -38,13 +38,12 @@ class VariableValues:
         missing: list[str] = []
 
         def lookup(name: str) -> float:
-            if name in without or name in self.volatile:
-                value = math.nan
-            else:
-                value = self._table(name).get(name, math.nan)
-            if math.isnan(value):
-                missing.append(name)
-            return value
+            if name not in without and name not in self.volatile:
+                value = self._table(name).get(name)
+                if value is not None:
+                    return value
+            missing.append(name)
+            return math.nan
 
         return evaluate(text, self._language, lookup), missing
 

@@ -16,7 +16,7 @@ from postproc.languages.core.motion_sources import ELSEWHERE, START, Meeting, So
 from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.call_effects import CallEffects, ModeChanges, leaving_words, mode_changes
-from postproc.languages.rapid.declared_data import DeclaredData, Usage, first_value, names_in, walk
+from postproc.languages.rapid.declared_data import DeclaredData, Usage, first_value, names_in
 from postproc.languages.rapid.evaluation import Evaluator, is_component, unknown_record
 from postproc.languages.rapid.instructions import (
     ANY_PROCEDURE,
@@ -36,6 +36,7 @@ from postproc.languages.rapid.program_state import ProgramState
 from postproc.languages.rapid.routine_entries import program_entries, run_again, run_aside, value_at_start
 from postproc.languages.rapid.routine_graph import RapidStep, RoutineGraph
 from postproc.languages.rapid.routine_names import RoutineNames
+from postproc.languages.rapid.step_budget import StepBudget
 from postproc.languages.rapid.syntax_tree import (
     Argument,
     AssignmentStatement,
@@ -53,25 +54,11 @@ from postproc.toolpath import ArcFrame, Kind, OrientationMode
 
 OTHER = MotionForm(Kind.OTHER)
 _SETTINGS = frozenset([b"TOOLDATA", b"WOBJDATA", b"SPEEDDATA", b"ZONEDATA"])
-MOST_STEPS = 4_000_000
-"""Statements that are followed; each statement of a file counts for four more."""
 NOT_CONSTANT = " is not constant: "
 MOST_RUNS = 8
 """Runs of main after each other until all of them start with the same."""
 DEEPEST = 12
 """Calls in each other."""
-MOST_IN_RUN = 10_000
-"""Statements of a run of the program, with eight more for each of the file, after which calls are not followed any
-more: what routines do that call others several times grows with a power of their number."""
-
-
-def _length(statement: object) -> int:
-    """The statements that a statement counts for."""
-    return len(statement) if isinstance(statement, PlainMotions) else 1
-
-
-class TooLong(Exception):
-    """The flow is too long to follow."""
 
 
 class Propagation:
@@ -111,10 +98,7 @@ class Propagation:
         self.preceding: dict[int, Remark | Varying | None] = {}
         self.rows = 0
         self.waited: set[Source] = set()
-        statements = sum(_length(one) for r in module.routines for one in walk(r.body))
-        self._steps = MOST_STEPS + 4 * statements
-        self._in_run = MOST_IN_RUN + 8 * statements
-        self._last_called = 0  # at as many steps left calls are not followed any more
+        self._budget = StepBudget(module)
         self._runner = FlowRunner(self._after, lambda: len(self._names.aliased))
 
     def run(self) -> None:
@@ -181,7 +165,7 @@ class Propagation:
     def _start(self) -> None:
         """Starts a run of the program."""
         self._runner.start()
-        self._last_called = self._steps - self._in_run
+        self._budget.start_run()
 
     def _lose_effects(self, name: bytes, state: ProgramState) -> None:
         """What calls of a routine may have done, or a part of it."""
@@ -223,9 +207,7 @@ class Propagation:
         return [(block.follow if holds else block.otherwise, state)]
 
     def _step(self, step: RapidStep, state: ProgramState) -> None:
-        self._steps -= _length(step)
-        if self._steps < 0:
-            raise TooLong
+        self._budget.take(step)
         match step:
             case Instruction():
                 self._instruction(step, state)
@@ -374,7 +356,7 @@ class Propagation:
 
     def _call(self, routine: RapidRoutine, step: Instruction, state: ProgramState) -> None:
         """Runs a routine of the file with its arguments."""
-        deep = len(self._names.active) >= DEEPEST or self._steps < self._last_called
+        deep = len(self._names.active) >= DEEPEST or not self._budget.has_calls
         if deep or routine in self._names.active or self.is_unclear(routine):
             self._again |= self._effects.of(routine.name).routines
             self._unread_call(step, state, moves=True)

@@ -39,12 +39,9 @@ def plain(value: Value) -> Value:
     if isinstance(value, Leaf):
         return value if value.start < 0 else Leaf(value.value)
     if isinstance(value, GroupValue):
-        items: Items
         if isinstance(value.items, ArrayItems):
-            items = value.items.mapped(plain)
-        else:
-            items = tuple(map(plain, value.items))
-        return GroupValue(items)
+            return GroupValue(value.items.mapped(plain))
+        return GroupValue(tuple(map(plain, value.items)))
     return value
 
 
