@@ -7,6 +7,7 @@ import random
 import pytest
 from drawn_hostile import LANGUAGES, draw
 from linear import MEGABYTES, SECONDS, import_readers, measure
+from linear_robots import TP_POINT
 
 from postproc.languages.gcode import execution
 from postproc.languages.gcode.expression_values import LINUXCNC
@@ -149,6 +150,73 @@ def test_blocks_in_each_other_that_declare_are_gone_over_once_more(monkeypatch, 
     read_program(path)
     lines = text.count("\n")
     assert max(flow.steps for flow in flows) < 4 * lines
+
+
+def _steps_of_krl(monkeypatch, path, count: int) -> int:
+    flows = []
+    run_all = ProgramFlow.all
+    with monkeypatch.context() as patch:
+        patch.setattr(ProgramFlow, "all", lambda flow: (flows.append(flow), run_all(flow))[1])
+        patch.setattr(open_blocks, "MOST_STEPS", 0)
+        names = range(1, count)
+        declared = "".join(f"DECL INT V{n}\n" for n in range(count)) + "".join(
+            f"V{n}=0\n" for n in range(count)
+        )
+        moved = "".join(f"V{n}=V{n - 1}\n" for n in reversed(names))
+        end = "V0=V0+1\nIF $IN[1] THEN\nEXIT\nENDIF\nENDLOOP\nLIN {X 1}\nEND\n"
+        path.write_text(f"DEF part()\n{declared}LOOP\n{moved}{end}")
+        read_program(path)
+    return max(flow.steps for flow in flows)
+
+
+def test_a_chain_of_values_through_a_loop_takes_few_passes_in_krl(monkeypatch, tmp_path):
+    """So many variables that all that the program assigns counts as changed."""
+    once, twice = (_steps_of_krl(monkeypatch, tmp_path / "part.src", count) for count in (400, 800))
+    assert twice < 2.5 * once
+    assert once < 400 * 16
+
+
+@pytest.mark.parametrize("end", ["WHILE", "GOTO"])
+def test_a_chain_of_values_through_a_loop_takes_few_passes(monkeypatch, end):
+    """Each pass makes one more of its variables unknown: after some passes all are."""
+    taken = 0
+    take = StepBudget.take
+
+    def counted(budget: StepBudget, statement: object) -> None:
+        nonlocal taken
+        taken += 1
+        take(budget, statement)
+
+    monkeypatch.setattr(StepBudget, "take", counted)
+    monkeypatch.setattr("postproc.languages.core.flow_runner.UNROLLED", 0)
+    declared = "".join(f"VAR num v{n}:=0;\n" for n in range(200))
+    moved = (
+        "".join(f"v{n}:=v{n - 1};\n" for n in range(199, 0, -1))
+        + "v0:=v0+1;\nMoveL Offs(p,v199,0,0),v1,z1,tool0;\n"
+    )
+    start, back = {"WHILE": ("WHILE di1=1 DO\n", "ENDWHILE\n"), "GOTO": ("x:\n", "IF di1=1 GOTO x;\n")}[end]
+    found = _propagation(f"{declared}{start}{moved}{back}")
+    assert taken < 400 * 60
+    [fact] = found.facts.values()
+    assert unknown_in(fact.target) is not None
+
+
+def test_registers_through_a_loop_are_lost_after_some_passes(tmp_path):
+    """What does not go through the loop stays known, and what a long chain makes unknown does not."""
+    found = {}
+    for count in (5, 60):
+        moved = "".join(f"1:R[{n}]=R[{n - 1}] ;\n" for n in range(count, 1, -1))
+        text = (
+            "/PROG A\n/ATTR\n/MN\n1:R[99]=1 ;\n"
+            + "".join(f"1:R[{n}]=0 ;\n" for n in range(1, count + 1))
+            + f"1:LBL[1] ;\n{moved}1:R[1]=R[1]+1 ;\n1:IF DI[1]=ON,JMP LBL[1] ;\n"
+            + f"1:UFRAME_NUM=R[99] ;\n1:UTOOL_NUM=R[{count}] ;\n1:L P[1] 9mm/sec FINE ;\n/POS\n{TP_POINT % 1}/END\n"
+        )
+        path = tmp_path / "part.ls"
+        path.write_text(text)
+        _, program, _ = read_program(path)
+        found[count] = (int(program.toolpath.base[0]) >= 0, int(program.toolpath.tool[0]) >= 0)
+    assert found == {5: (True, False), 60: (False, False)}
 
 
 def test_a_call_takes_the_time_of_its_own_variables(monkeypatch):

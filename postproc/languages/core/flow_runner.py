@@ -5,6 +5,7 @@ A loop whose conditions are constants is run pass by pass, any other one until n
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from heapq import heappop, heappush
 from typing import Any, Generic, Protocol, TypeVar
@@ -24,6 +25,9 @@ LONG = 8
 """Statements of a block from which on it is remembered what it did with the states of its last runs."""
 KEPT = 3
 """Runs that are remembered."""
+MOST_PASSES = 16
+"""Passes over a place after which what is known of variables there is lost where it still changes: a chain of
+assignments would else take as many passes as it has variables."""
 
 
 class FlowState(Protocol):
@@ -37,6 +41,13 @@ class FlowState(Protocol):
 
     def is_same(self: State, other: State) -> bool:
         """Whether the same holds in both."""
+
+    @property
+    def known(self) -> object:
+        """What is known of variables: another object where it is another."""
+
+    def forget(self: State) -> None:
+        """Makes every variable unknown that the program has set."""
 
 
 State = TypeVar("State", bound=FlowState)
@@ -159,13 +170,15 @@ class FlowRunner(Generic[Graph, State]):
             return self._repeated(graph, head, after, state, ends)
         state, before = state.copy(), self.recording
         self._unknown += 1
+        passes = 0
         try:
             self.recording = False
             while True:
+                passes += 1
                 found: list[State] = []
                 inside, end = self._entered(graph, head, after, state)
                 back = None if inside is None else self._region(graph, head + 1, after, inside, found)
-                if back is None or not state.join(back, graph.meetings[head]):
+                if back is None or not self._learns(state, back, graph.meetings[head], passes):
                     break
             self.recording = before
             if before:
@@ -178,6 +191,15 @@ class FlowRunner(Generic[Graph, State]):
             self.recording = before
             self._unknown -= 1
         return end
+
+    def _learns(self, state: State, other: State, meeting: Meeting, passes: int) -> bool:
+        """Joins what holds where another path leads to a place that was passed before; whether anything changed."""
+        known = state.known
+        if not state.join(other, meeting):
+            return False
+        if passes >= MOST_PASSES and state.known is not known:
+            state.forget()
+        return True
 
     def _entered(
         self, graph: Graph, head: int, after: int, state: State
@@ -213,9 +235,14 @@ class FlowRunner(Generic[Graph, State]):
         before, self.recording = self.recording, False
         starts, pending, waiting = {first: state.copy()}, [first], {first}
         outside: dict[int, list[tuple[int, State]]] = {}
-        while pending:
+        passes = Counter[int]()
+        later: list[int] = []  # what a jump back leads to waits for the rest of the text
+        while pending or later:
+            if not pending:
+                pending, later = sorted(later), []
             at = heappop(pending)
             waiting.remove(at)
+            passes[at] += 1
             outside[at] = []
             for there, after in self._after(graph, at, starts[at].copy()):
                 if not first <= there < stop:
@@ -223,11 +250,14 @@ class FlowRunner(Generic[Graph, State]):
                     continue
                 if there not in starts:
                     starts[there] = after.copy()
-                elif not starts[there].join(after, graph.meetings[there]):
+                elif not self._learns(starts[there], after, graph.meetings[there], passes[there]):
                     continue
                 if there not in waiting:
                     waiting.add(there)
-                    heappush(pending, there)
+                    if there > at:
+                        heappush(pending, there)
+                    else:
+                        later.append(there)
         self.recording = before
         runs.append((state.copy(), self._version(), (starts, outside)))
         del runs[:-KEPT]
