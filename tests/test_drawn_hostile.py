@@ -128,6 +128,16 @@ def test_what_is_remembered_of_a_loop_is_of_its_state():
     assert unknown_in(two.target) is not None
 
 
+@pytest.mark.parametrize(("operator", "value"), [("+", 3001.0), ("-", -2999.0), ("*", 1.0)])
+def test_a_long_expression_has_its_value(operator, value):
+    text = operator.join(["1"] * 3001)
+    found = _propagation(
+        f"p:=[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\nMoveL Offs(p,{text},0,0),v1,z1,t;\n"
+    )
+    [fact] = found.facts.values()
+    assert fact.target.items[0].items[0].value == value + 1
+
+
 @pytest.mark.parametrize(
     ("head", "steps"),
     [("1 TO 9", 3), ("1 TO 9 STEP 2", 3), ("1 TO n", 7), ("n TO 9", 5), ("1 TO 9 STEP n", 5), ("9 TO -n", 7)],
