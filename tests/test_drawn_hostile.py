@@ -215,6 +215,7 @@ def test_a_chain_of_values_through_a_loop_takes_few_passes(monkeypatch, end):
 def test_registers_through_a_loop_are_lost_after_some_passes(monkeypatch, tmp_path):
     """What does not go through the loop stays known, and what a long chain makes unknown does not."""
     found, run = {}, TpPropagation.run
+    flows: list[TpPropagation] = []
     for count in (5, 60):
         moved = "".join(f"1:R[{n}]=R[{n - 1}] ;\n" for n in range(count, 1, -1))
         text = (
@@ -225,7 +226,6 @@ def test_registers_through_a_loop_are_lost_after_some_passes(monkeypatch, tmp_pa
         )
         path = tmp_path / "part.ls"
         path.write_text(text)
-        flows: list[TpPropagation] = []
         with monkeypatch.context() as patch:
             patch.setattr(TpPropagation, "run", lambda flow, state: (flows.append(flow), run(flow, state)))
             read_program(path)
