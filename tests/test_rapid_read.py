@@ -157,7 +157,7 @@ def test_a_refused_arc_locks_its_start() -> None:
 def test_a_flow_that_is_too_long_corrects_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = "".join(f"PROC r{n}()\n" + f"r{n + 1};\n" * 12 + "ENDPROC\n" for n in range(9))
     text = f"MODULE m\nPROC main()\nr0;\nENDPROC\n{calls}PROC r9()\nMoveL {TARGET},v100,z1,tool0;\nENDPROC\nENDMODULE\n"
-    monkeypatch.setattr("postproc.languages.rapid.propagation.MOST_STEPS", 2000)
+    monkeypatch.setattr("postproc.languages.rapid.step_budget.MOST_STEPS", 2000)
     program = read(text)
     assert "RAP017" in {finding.code for finding in program.findings}
     assert len(codes(program)) == len(program.toolpath) == 1

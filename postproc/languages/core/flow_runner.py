@@ -5,6 +5,7 @@ A loop whose conditions are constants is run pass by pass, any other one until n
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from heapq import heappop, heappush
 from typing import Any, Generic, Protocol, TypeVar
@@ -24,6 +25,9 @@ LONG = 8
 """Statements of a block from which on it is remembered what it did with the states of its last runs."""
 KEPT = 3
 """Runs that are remembered."""
+MOST_PASSES = 16
+"""Passes over a place after which what is known of variables there is lost where it still changes: a chain of
+assignments would else take as many passes as it has variables."""
 
 
 class FlowState(Protocol):
@@ -38,8 +42,16 @@ class FlowState(Protocol):
     def is_same(self: State, other: State) -> bool:
         """Whether the same holds in both."""
 
+    @property
+    def known(self) -> object:
+        """What is known of variables: another object where it is another."""
+
+    def forget(self: State) -> None:
+        """Makes every variable unknown that the program has set."""
+
 
 State = TypeVar("State", bound=FlowState)
+_Stable = tuple[dict[int, State], dict[int, list[tuple[int, State]]]]
 Graph = TypeVar("Graph", bound=FlowGraph[Any, Any, Any])
 
 
@@ -55,6 +67,7 @@ class FlowRunner(Generic[Graph, State]):
         self._run_block, self._version = after, version
         self.recording = False
         self._known: dict[tuple[int, int], list[tuple[State, int, list[tuple[int, State]]]]] = {}
+        self._stable_known: dict[tuple[int, int, int], list[tuple[State, int, _Stable[State]]]] = {}
         self._left = 0  # statements and blocks that can still be run in loops
         self._deep = 0  # loops in each other
         self._unknown = 0  # loops that are run until nothing changes
@@ -157,13 +170,15 @@ class FlowRunner(Generic[Graph, State]):
             return self._repeated(graph, head, after, state, ends)
         state, before = state.copy(), self.recording
         self._unknown += 1
+        passes = 0
         try:
             self.recording = False
             while True:
+                passes += 1
                 found: list[State] = []
                 inside, end = self._entered(graph, head, after, state)
                 back = None if inside is None else self._region(graph, head + 1, after, inside, found)
-                if back is None or not state.join(back, graph.meetings[head]):
+                if back is None or not self._learns(state, back, graph.meetings[head], passes):
                     break
             self.recording = before
             if before:
@@ -177,6 +192,15 @@ class FlowRunner(Generic[Graph, State]):
             self._unknown -= 1
         return end
 
+    def _learns(self, state: State, other: State, meeting: Meeting, passes: int) -> bool:
+        """Joins what holds where another path leads to a place that was passed before; whether anything changed."""
+        known = state.known
+        if not state.join(other, meeting):
+            return False
+        if passes >= MOST_PASSES and state.known is not known:
+            state.forget()
+        return True
+
     def _entered(
         self, graph: Graph, head: int, after: int, state: State
     ) -> tuple[State | None, State | None]:
@@ -188,25 +212,8 @@ class FlowRunner(Generic[Graph, State]):
 
     def _repeated(self, graph: Graph, first: int, stop: int, state: State, ends: list[State]) -> State | None:
         """As ``_region``, of blocks that go back in any way: each with what holds on all paths that lead to it."""
-        before, self.recording = self.recording, False
-        starts, pending, waiting = {first: state.copy()}, [first], {first}
-        outside: dict[int, list[tuple[int, State]]] = {}
-        while pending:
-            at = heappop(pending)
-            waiting.remove(at)
-            outside[at] = []
-            for there, after in self._after(graph, at, starts[at].copy()):
-                if not first <= there < stop:
-                    outside[at].append((there, after))
-                    continue
-                if there not in starts:
-                    starts[there] = after.copy()
-                elif not starts[there].join(after, graph.meetings[there]):
-                    continue
-                if there not in waiting:
-                    waiting.add(there)
-                    heappush(pending, there)
-        self.recording = before
+        starts, outside = self._stable(graph, first, stop, state)
+        before = self.recording
         leaving: list[State] = []
         for at in sorted(starts):
             led = self._after(graph, at, starts[at].copy()) if before else outside[at]
@@ -216,6 +223,45 @@ class FlowRunner(Generic[Graph, State]):
                 elif there >= 0 and not first <= there < stop:
                     leaving.append(after.copy())
         return _joined(leaving, graph.meetings[first, stop])
+
+    def _stable(self, graph: Graph, first: int, stop: int, state: State) -> _Stable[State]:
+        """What holds before the blocks from ``first`` to before ``stop`` once nothing changes any more, and with what
+        each leaves for others; remembered, as a loop around them often comes with the same again."""
+        runs = self._stable_known.setdefault((id(graph), first, stop), [])
+        version = self._version()
+        for known_state, known_version, found in runs:
+            if known_version == version and known_state.is_same(state):
+                return found
+        before, self.recording = self.recording, False
+        starts, pending, waiting = {first: state.copy()}, [first], {first}
+        outside: dict[int, list[tuple[int, State]]] = {}
+        passes = Counter[int]()
+        later: list[int] = []  # what a jump back leads to waits for the rest of the text
+        while pending or later:
+            if not pending:
+                pending, later = sorted(later), []
+            at = heappop(pending)
+            waiting.remove(at)
+            passes[at] += 1
+            outside[at] = []
+            for there, after in self._after(graph, at, starts[at].copy()):
+                if not first <= there < stop:
+                    outside[at].append((there, after))
+                    continue
+                if there not in starts:
+                    starts[there] = after.copy()
+                elif not self._learns(starts[there], after, graph.meetings[there], passes[there]):
+                    continue
+                if there not in waiting:
+                    waiting.add(there)
+                    if there > at:
+                        heappush(pending, there)
+                    else:
+                        later.append(there)
+        self.recording = before
+        runs.append((state.copy(), self._version(), (starts, outside)))
+        del runs[:-KEPT]
+        return starts, outside
 
 
 def _joined(states: list[State], meeting: Meeting) -> State | None:

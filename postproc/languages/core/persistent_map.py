@@ -8,11 +8,14 @@ JCSS 38, 1989).
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator
+from itertools import compress
+from operator import is_not
 from typing import Any
 
 WIDTH = 16
 BITS = 4
 _EMPTY: tuple[Any, ...] = (None,) * WIDTH
+_PLACES = range(WIDTH)
 
 Merge = Callable[[Any, Any, Any], Any]
 """The value of a key from its values in two maps, None where one has none."""
@@ -135,9 +138,8 @@ def _merged(
     if known is not None and place in known:
         return known[place][2]
     merged, is_own, is_other = list(own), True, True
-    for at, (one, two) in enumerate(zip(own, other, strict=True)):
-        if one is two:
-            continue
+    for at in compress(_PLACES, map(is_not, own, other)):
+        one, two = own[at], other[at]
         if depth:
             mine, others = one or _EMPTY, two or _EMPTY
             new = _merged(mine, others, depth - 1, (base + at) * WIDTH, keys, merge, known)
@@ -157,8 +159,9 @@ def _merged(
 
 def _common(own: tuple[Any, ...], other: tuple[Any, ...], depth: int) -> tuple[Any, ...]:
     kept: list[Any] | None = None
-    for at, (one, two) in enumerate(zip(own, other, strict=True)):
-        if one is None or one is two:
+    for at in compress(_PLACES, map(is_not, own, other)):
+        one, two = own[at], other[at]
+        if one is None:
             continue
         if two is None:
             new = None

@@ -34,6 +34,8 @@ MACRO = 65
 """G65 calls as M98, with values for variables."""
 RESTARTS = 20
 """How often a program is followed again with more that may run or not."""
+MOST_STEPS = 100_000
+"""Statements after which, with four more for each of the program, it is not followed again."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,12 +109,15 @@ def execute(
             raise NotFollowed
         shape = structure(source.notes)
         opaque: set[int] = set()
+        steps = 0
         for _ in range(RESTARTS):
             run = RunFlow(source, control, VariableValues(language, known, control.name), shape, opaque)
             try:
                 return _result(run, run.follow(), True, own)
             except RunAgain:
-                continue
+                steps += run.steps
+            if steps > MOST_STEPS + 4 * len(run.special):
+                break
     except NotFollowed:
         pass
     run = RunFlow(

@@ -13,6 +13,7 @@ from postproc.base.arrays import Floats, Ints, shared
 from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses, rotation_from_abc
+from postproc.base.memory import without_garbage_collection
 from postproc.base.units import DEG, MM
 from postproc.languages.dialect import PLAIN, Program, ReadingSettings
 from postproc.languages.gcode import offsets
@@ -85,6 +86,7 @@ PART = 1 << 14
 """Blocks whose motions are worked out at a time."""
 
 
+@without_garbage_collection()
 def read(documents: tuple[Document, ...], control: Control, settings: ReadingSettings = PLAIN) -> Program:
     """Read a program; never raises on its content."""
     document = documents[0]

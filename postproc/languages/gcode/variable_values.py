@@ -23,9 +23,12 @@ class VariableValues:
     """
 
     def __init__(self, language: ExpressionLanguage, known: Mapping[str, float], control: str) -> None:
-        self._language, self._values = language, dict(known)
+        self._language = language
         self._bound = frozenset(known)
         self._local: dict[str, bool] = {}
+        self._shared: dict[str, float] = {}
+        self._own: dict[str, float] = {}  # what a subprogram does not see
+        self._put(known)
         self.volatile: set[str] = set()
         self.parallel = language is LINUXCNC
         self.result = math.nan
@@ -35,10 +38,12 @@ class VariableValues:
         missing: list[str] = []
 
         def lookup(name: str) -> float:
-            value = math.nan if name in without or name in self.volatile else self._values.get(name, math.nan)
-            if math.isnan(value):
-                missing.append(name)
-            return value
+            if name not in without and name not in self.volatile:
+                value = self._table(name).get(name)
+                if value is not None:
+                    return value
+            missing.append(name)
+            return math.nan
 
         return evaluate(text, self._language, lookup), missing
 
@@ -67,13 +72,23 @@ class VariableValues:
         number = _NUMBERED.fullmatch(name)
         system = number is not None and int(number[1]) >= _SYSTEM.get(id(self._language), 0)
         if math.isnan(value) or system:
-            self._values.pop(name, None)
+            self._table(name).pop(name, None)
         else:
-            self._values[name] = value
+            self._table(name)[name] = value
+
+    def _table(self, name: str) -> dict[str, float]:
+        """Where the value of a variable is kept."""
+        return self._own if self._is_local(name) else self._shared
+
+    def _put(self, values: Mapping[str, float]) -> None:
+        for name, value in values.items():
+            if not math.isnan(value):
+                self._table(name)[name] = value
 
     def forget(self) -> None:
         """Code that was not read ran."""
-        self._values.clear()
+        self._shared.clear()
+        self._own.clear()
 
     def _is_local(self, name: str) -> bool:
         known = self._local.get(name)
@@ -95,14 +110,12 @@ class VariableValues:
 
     def enter(self, arguments: dict[str, float]) -> dict[str, float]:
         """Goes into a subprogram; the variables of the caller that it does not see."""
-        outer = {name: value for name, value in self._values.items() if self._is_local(name)}
-        self._values = {name: value for name, value in self._values.items() if name not in outer}
-        self._values |= {name: value for name, value in arguments.items() if not math.isnan(value)}
+        outer, self._own = self._own, {}
+        self._put(arguments)
         return outer
 
     def leave(self, outer: dict[str, float]) -> None:
         """Back to the caller."""
-        kept = {name: value for name, value in self._values.items() if not self._is_local(name)}
-        self._values = {**kept, **outer}
+        self._own = outer
         self.set("#<_VALUE>", self.result)
         self.result = math.nan

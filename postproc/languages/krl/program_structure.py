@@ -300,6 +300,8 @@ class _Surveyor:
             for key, _, _ in said.items:
                 if key is not None:
                     self.routine.types[key.split(b"[")[0]] = said.type
+            if len(stack) > 1:  # in a block it is declared again and again
+                effects = effects | {key.split(b"[")[0] for key, _, _ in said.items if key is not None}
         found.read |= read_by(statement)
         if statement.word in EVENTS:
             self._event(statement)

@@ -111,7 +111,10 @@ class Variables:
         if one.names.root is other.names.root and one.unknown is other.unknown:
             return one
 
-        def merge(name: bytes, a: PersistentMap | None, b: PersistentMap | None) -> PersistentMap:
+        def merge(name: bytes, a: PersistentMap | None, b: PersistentMap | None) -> PersistentMap | None:
+            if a is None and one.unknown is not None and name not in self.fixed:
+                self.mixed.add(name)
+                return None  # it is one of those that are not known already
             left, right = self._declared(one, name, a), self._declared(other, name, b)
             return left.merged(right, lambda path, _a, _b: self._join(name, path, left, right))
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from postproc.languages.core.reach import reached
+from postproc.languages.rapid.array_items import repeated
 from postproc.languages.rapid.data_types import RECORDS, SPEEDS, STOP_KINDS, STOP_POINTS, ZONES, Components
 from postproc.languages.rapid.evaluation import Evaluator, Typed
 from postproc.languages.rapid.instructions import (
@@ -133,7 +134,7 @@ def first_value(declaration: DataDeclaration, evaluator: Evaluator) -> Value:
         if count is None or not 1 <= count <= LARGEST or count != int(count) or size * count > LARGEST:
             return UnknownData(f"the size of {shown} is not known")
         size *= count
-        value = GroupValue((value,) * int(count))
+        value = GroupValue(repeated(value, int(count)))
     return value
 
 

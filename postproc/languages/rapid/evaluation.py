@@ -149,8 +149,16 @@ class Evaluator:
         return value, kind
 
     def _operation(self, expression: OperatorExpression) -> Value:
-        values = [self.value(operand) for operand in expression.operands]
-        operator = expression.operator
+        """The value of an expression of operators; of a long one from its innermost first operand on."""
+        chain = [expression]
+        while isinstance(first := chain[-1].operands[0], OperatorExpression):
+            chain.append(first)
+        value = self.value(first)
+        for one in reversed(chain):
+            value = self._operated(one.operator, [value, *map(self.value, one.operands[1:])])
+        return value
+
+    def _operated(self, operator: bytes, values: list[Value]) -> Value:
         if operator == b"()":
             return values[0]
         if operator in (b"AND", b"OR"):

@@ -14,8 +14,9 @@ from postproc.languages.core.row_facts import not_understood
 from postproc.languages.dialect import EditSyntax, Program, ReadingSettings
 from postproc.languages.rapid.module_toolpath import module_toolpath
 from postproc.languages.rapid.parsing import ModuleParser
-from postproc.languages.rapid.propagation import Propagation, TooLong
+from postproc.languages.rapid.propagation import Propagation
 from postproc.languages.rapid.remarks import find_marker
+from postproc.languages.rapid.step_budget import TooLong
 from postproc.languages.rapid.syntax_tree import Module
 
 SYNTAX = EditSyntax(comment=b"!", numbers_after=b"[,")

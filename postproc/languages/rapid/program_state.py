@@ -58,6 +58,17 @@ class ProgramState:
         for name in [name for name, _ in self.values.items() if name.startswith(routine + b"/")]:
             self.values = self.values.set(name, None)
 
+    @property
+    def known(self) -> PersistentMap:
+        """What is known of variables."""
+        return self.values
+
+    def forget(self) -> None:
+        """Makes every variable unknown that the program has set."""
+        for name, value in self.values.items():
+            if not isinstance(value, UnknownData):
+                self.put(name, UnknownData(_varying(name)))
+
     def is_same(self, other: ProgramState) -> bool:
         """Whether the same holds in both."""
         apart = self.last == other.last and _JOINS.values(self) == _JOINS.values(other)
@@ -97,10 +108,16 @@ def _of_paths(name: bytes, one: Value | None, other: Value | None) -> Value:
     """The value of a variable where two paths meet."""
     if isinstance(one, UnknownData) and one == other:
         return one
-    shown = name.rpartition(b"/")[2].decode("latin-1")
-    reason = f"{shown} has different values on several paths of the program"
+    reason = _varying(name)
     new = UnknownData(reason) if one is None or other is None else joined(one, other, reason)
     return one if one is not None and new == one else other if other is not None and new == other else new
+
+
+def _varying(name: bytes) -> str:
+    """Why a variable is not known whose values differ."""
+    return (
+        f"{name.rpartition(b'/')[2].decode('latin-1')} has different values on several paths of the program"
+    )
 
 
 def same_values(one: PersistentMap, other: PersistentMap) -> bool:

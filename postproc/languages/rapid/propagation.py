@@ -16,7 +16,7 @@ from postproc.languages.core.motion_sources import ELSEWHERE, START, Meeting, So
 from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.call_effects import CallEffects, ModeChanges, leaving_words, mode_changes
-from postproc.languages.rapid.declared_data import DeclaredData, Usage, first_value, names_in, walk
+from postproc.languages.rapid.declared_data import DeclaredData, Usage, first_value, names_in
 from postproc.languages.rapid.evaluation import Evaluator, is_component, unknown_record
 from postproc.languages.rapid.instructions import (
     ANY_PROCEDURE,
@@ -36,6 +36,7 @@ from postproc.languages.rapid.program_state import ProgramState
 from postproc.languages.rapid.routine_entries import program_entries, run_again, run_aside, value_at_start
 from postproc.languages.rapid.routine_graph import RapidStep, RoutineGraph
 from postproc.languages.rapid.routine_names import RoutineNames
+from postproc.languages.rapid.step_budget import StepBudget
 from postproc.languages.rapid.syntax_tree import (
     Argument,
     AssignmentStatement,
@@ -53,22 +54,11 @@ from postproc.toolpath import ArcFrame, Kind, OrientationMode
 
 OTHER = MotionForm(Kind.OTHER)
 _SETTINGS = frozenset([b"TOOLDATA", b"WOBJDATA", b"SPEEDDATA", b"ZONEDATA"])
-MOST_STEPS = 4_000_000
-"""Statements that are followed; each statement of a file counts for four more."""
 NOT_CONSTANT = " is not constant: "
 MOST_RUNS = 8
 """Runs of main after each other until all of them start with the same."""
 DEEPEST = 12
 """Calls in each other."""
-
-
-def _length(statement: object) -> int:
-    """The statements that a statement counts for."""
-    return len(statement) if isinstance(statement, PlainMotions) else 1
-
-
-class TooLong(Exception):
-    """The flow is too long to follow."""
 
 
 class Propagation:
@@ -108,7 +98,7 @@ class Propagation:
         self.preceding: dict[int, Remark | Varying | None] = {}
         self.rows = 0
         self.waited: set[Source] = set()
-        self._steps = MOST_STEPS + 4 * sum(_length(one) for r in module.routines for one in walk(r.body))
+        self._budget = StepBudget(module)
         self._runner = FlowRunner(self._after, lambda: len(self._names.aliased))
 
     def run(self) -> None:
@@ -145,7 +135,7 @@ class Propagation:
             state.displaced |= {b"a trap or an error handler"}
         if is_main:
             self._start_again(routine, state)
-        self._runner.start()
+        self._start()
         end = self._routine(routine, state, True)
         if end is not None:
             self._leave_place(end)
@@ -156,7 +146,7 @@ class Propagation:
         if not (any(state.values.items()) or changes.names):
             return
         for _ in range(0 if self._restarts else MOST_RUNS):
-            self._runner.start()
+            self._start()
             after = self._routine(main, state.copy(), False)
             again = state.copy()
             if after is not None:
@@ -171,6 +161,11 @@ class Propagation:
             state.take(again)
         self._forget_all(self.usage.assigned, state)
         changes._replace(speaks=False).lose(state, b"an earlier run")
+
+    def _start(self) -> None:
+        """Starts a run of the program."""
+        self._runner.start()
+        self._budget.start_run()
 
     def _lose_effects(self, name: bytes, state: ProgramState) -> None:
         """What calls of a routine may have done, or a part of it."""
@@ -212,9 +207,7 @@ class Propagation:
         return [(block.follow if holds else block.otherwise, state)]
 
     def _step(self, step: RapidStep, state: ProgramState) -> None:
-        self._steps -= _length(step)
-        if self._steps < 0:
-            raise TooLong
+        self._budget.take(step)
         match step:
             case Instruction():
                 self._instruction(step, state)
@@ -363,7 +356,8 @@ class Propagation:
 
     def _call(self, routine: RapidRoutine, step: Instruction, state: ProgramState) -> None:
         """Runs a routine of the file with its arguments."""
-        if routine in self._names.active or len(self._names.active) >= DEEPEST or self.is_unclear(routine):
+        deep = len(self._names.active) >= DEEPEST or not self._budget.has_calls
+        if deep or routine in self._names.active or self.is_unclear(routine):
             self._again |= self._effects.of(routine.name).routines
             self._unread_call(step, state, moves=True)
             self._lose_effects(routine.name, state)

@@ -19,6 +19,7 @@ from postproc.languages.rapid.syntax_tree import (
     Leave,
     Name,
     NotUnderstood,
+    NumberLiteral,
     OperatorExpression,
     PlainMotions,
     Remark,
@@ -82,23 +83,47 @@ class RoutineGraph(FlowGraph[RapidStep, Expression, bytes]):
 
     def _for(self, statement: For) -> None:
         """last := ..; step := ..; i := first; WHILE i is not beyond last DO ...; i := i + step; ENDWHILE.  Without a
-        step it counts down where the first value exceeds the last one."""
+        step it counts down where the first value exceeds the last one.  Numbers stand for themselves."""
         at = statement.start
-        name, last, step = (Name(word, at, at) for word in (statement.name, *loop_names(self._depth)))
-        sense = statement.step or OperatorExpression(SENSE, (statement.first, statement.last), at, at)
+        name = Name(statement.name, at, at)
+        kept: list[tuple[Name, Expression]] = []
+        last, step = (
+            _kept(value, Name(word, at, at), kept)
+            for word, value in zip(
+                loop_names(self._depth), (statement.last, statement.step or _sense(statement)), strict=True
+            )
+        )
         more = OperatorExpression(b"+", (name, step), at, at)
-        self._assign(at, (last, statement.last), (step, sense), (name, statement.first))
+        self._assign(at, *kept, (name, statement.first))
         self._depth += 1
         head = self.loop(OperatorExpression(GOES_ON, (name, last, step), at, at))
         self._body(statement.body)
         self._assign(at, (name, more))
         self.end_loop(head)
         self._depth -= 1
-        self._assign(at, *((target, NOTHING) for target in (name, last, step)))  # they are of the loop alone
+        self._assign(
+            at, *((target, NOTHING) for target in (name, *(one for one, _ in kept)))
+        )  # of the loop alone
 
     def _assign(self, at: int, *pairs: tuple[Name, Expression]) -> None:
         for target, value in pairs:
             self.step(AssignmentStatement(target, value, at, at))
+
+
+def _sense(statement: For) -> Expression:
+    """1 or -1, as a FOR without a step counts."""
+    first, last, at = statement.first, statement.last, statement.start
+    if isinstance(first, NumberLiteral) and isinstance(last, NumberLiteral):
+        return NumberLiteral(1.0 if first.value <= last.value else -1.0, at, at)
+    return OperatorExpression(SENSE, (first, last), at, at)
+
+
+def _kept(value: Expression, name: Name, kept: list[tuple[Name, Expression]]) -> Expression:
+    """A number itself; the name under which any other value is kept while a loop runs, added to ``kept``."""
+    if isinstance(value, NumberLiteral):
+        return value
+    kept.append((name, value))
+    return name
 
 
 def _is_one_of(statement: Test, values: tuple[Expression, ...]) -> Expression:

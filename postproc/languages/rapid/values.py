@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
+
+from postproc.languages.rapid.array_items import ArrayItems, Items, with_item
 
 
 class Leaf(NamedTuple):
@@ -14,9 +17,9 @@ class Leaf(NamedTuple):
 
 
 class GroupValue(NamedTuple):
-    """An aggregate or an array."""
+    """An aggregate or an array; ``items``: its values."""
 
-    items: tuple[Value, ...]
+    items: Items
 
 
 class UnknownData(NamedTuple):
@@ -36,6 +39,8 @@ def plain(value: Value) -> Value:
     if isinstance(value, Leaf):
         return value if value.start < 0 else Leaf(value.value)
     if isinstance(value, GroupValue):
+        if isinstance(value.items, ArrayItems):
+            return GroupValue(value.items.mapped(plain))
         return GroupValue(tuple(map(plain, value.items)))
     return value
 
@@ -50,6 +55,8 @@ def joined(one: Value, other: Value, reason: str) -> Value:
         )
         return Leaf(one.value) if same else UnknownData(reason)
     if isinstance(one, GroupValue) and isinstance(other, GroupValue) and len(one.items) == len(other.items):
+        if isinstance(one.items, ArrayItems) and isinstance(other.items, ArrayItems):
+            return GroupValue(one.items.joined(other.items, partial(joined, reason=reason)))
         return GroupValue(tuple(joined(a, b, reason) for a, b in zip(one.items, other.items, strict=True)))
     if isinstance(one, UnknownData):
         return UnknownData(one.reason) if one.name else one
@@ -61,6 +68,9 @@ def unknown_in(value: Value) -> UnknownData | None:
     if isinstance(value, UnknownData):
         return value
     if isinstance(value, GroupValue):
+        if isinstance(value.items, ArrayItems):
+            unknown: UnknownData | None = value.items.first(unknown_in)
+            return unknown
         for item in value.items:
             found = unknown_in(item)
             if found is not None:
@@ -96,4 +106,4 @@ def replaced(value: Value, place: tuple[int, ...], new: Value, reason: str) -> V
         return UnknownData(reason)
     at = place[0]
     part = replaced(value.items[at], place[1:], new, reason)
-    return GroupValue((*value.items[:at], part, *value.items[at + 1 :]))
+    return GroupValue(with_item(value.items, at, part))

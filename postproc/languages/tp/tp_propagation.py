@@ -129,6 +129,15 @@ class Reached:
         self.waits = self.waits if self.waits == other.waits else Waits.MAYBE
         return self.state is not before.state or (self.last, self.waits) != (before.last, before.waits)
 
+    @property
+    def known(self) -> PersistentMap:
+        """What is known of registers."""
+        return self.state.registers
+
+    def forget(self) -> None:
+        """Makes every register unknown that the program has set."""
+        self.state = self.state.without_registers()
+
     def is_same(self, other: Reached) -> bool:
         return self == other
 
