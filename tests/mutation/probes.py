@@ -1,7 +1,8 @@
 """Who reaches a mutant, and the mutant in its place, without a second import.
 
 A module with mutants is imported with calls in it that note which of them a run comes by: before the statement of each
-mutant inside of a function; at the start of every function of the file for one that runs at import.  In a process that
+mutant inside of a function; at the start of every function of the file for one that runs at import.  A file without
+functions, a table, is what every test may come by.  In a process that
 is forked later the function that holds a mutant gets the code of the mutated file: what was imported stays.
 """
 
@@ -128,6 +129,13 @@ class Probes:
         for number, mutant in enumerate(mutants):
             self.files.setdefault(str(tree / mutant.path), {})[number] = mutant
         self.reached = Reached()
+        self.of_tables = {
+            number
+            for path, some in self.files.items()
+            if not outer_functions(ast.parse(Path(path).read_text(encoding="utf-8")))
+            for number in some
+        }
+        """Mutants of files without functions."""
 
     def install(self) -> None:
         setattr(builtins, NOTE, self.reached)

@@ -148,6 +148,7 @@ class _Runner:
             own = set()
         else:
             own |= self.prepared(item) | self.collected.get(item.nodeid.split("::")[0], set())
+            own |= self.probes.of_tables
         self.keep({"test": item.nodeid, "seconds": seconds, "reached": sorted(own)})
         return result
 
@@ -209,9 +210,26 @@ def _run(items: Sequence[Any], seconds: dict[str, float], note: Path) -> int:
 
 
 def is_near(tree: Path, test: str, packages: Sequence[str]) -> bool:
-    """Whether a file of tests imports what is in the packages."""
+    """Whether a file of tests imports what is in the packages, itself or through modules of the tests, or the package
+    around them, which leads to it."""
     names = tuple(package.replace("/", ".") for package in packages)
-    return any(one.startswith(names) for one in judging.imported(tree / test))
+    around = {name.rpartition(".")[0] for name in names if name.count(".") > 1}
+    open_, seen = [tree / test], set()
+    while open_:
+        found = judging.imported(open_.pop())
+        if any(one.startswith(names) or one in around for one in found):
+            return True
+        paths = {_of_tests(tree, one) for one in found} - {None} - seen
+        seen |= paths
+        open_ += [path for path in paths if path is not None]
+    return False
+
+
+def _of_tests(tree: Path, module: str) -> Path | None:
+    """The file of a module of the tests, None for another."""
+    path = (tree / "tests").joinpath(*module.split("."))
+    files = (path.with_suffix(".py"), path / "__init__.py")
+    return next((one for one in files if one.is_file()), None)
 
 
 def run(
