@@ -41,10 +41,15 @@ class Node:
 
 
 class Ran(NamedTuple):
-    """A motion that ran: its statement, and where it ended."""
+    """A motion that ran: its statement, where it ended, and whether nothing of that hangs on a doubt."""
 
     node: Node
     end: tuple[float, float, float]
+    sure: bool
+
+
+def verbs_of(nodes: Sequence[Node]) -> set[str]:
+    return {node.verb for node in nodes}.union(*(verbs_of([*node.body, *node.other]) for node in nodes))
 
 
 class _Left(Exception):
@@ -60,6 +65,11 @@ class Run:
         self.arguments: list[float] = []
         self.here = {"X": 0.0, "Y": 0.0, "Z": 0.0}
         self.motions: list[Ran] = []
+        self.unsure: set[Any] = set()
+        """Variables and axes whose values hang on a doubt."""
+        self.doubts = 0
+        self.called = False
+        """Whether a subprogram was called in a doubt: what it leaves is not followed."""
 
     def value(self, text: Expr) -> Any:
         if not isinstance(text, tuple):
@@ -87,21 +97,58 @@ class Run:
     def move(self, node: Node) -> None:
         for axis, value in node.value.items():
             self.here[axis] = self.value(value)
-        self.motions.append(Ran(node, (self.here["X"], self.here["Y"], self.here["Z"])))
+            self.note(axis, value)
+        sure = not self.doubts and not self.called and not self.unsure & {"X", "Y", "Z"}
+        self.motions.append(Ran(node, (self.here["X"], self.here["Y"], self.here["Z"]), sure))
 
     def set(self, node: Node) -> None:
         self.values[node.name] = self.value(node.value)
+        self.note(node.name, node.value)
+
+    def note(self, name: Any, value: Expr) -> None:
+        """Whether what is set now hangs on a doubt."""
+        (self.unsure.add if self.doubts or self.hangs(value) else self.unsure.discard)(name)
+
+    def hangs(self, text: Expr) -> bool:
+        if not isinstance(text, tuple):
+            return False
+        return text[1] in self.unsure if text[0] == "v" else any(map(self.hangs, text[1:]))
+
+    def may_set(self, nodes: Sequence[Node]) -> set[Any]:
+        """Variables and axes that the statements set, if they run."""
+        found: set[Any] = set()
+        for node in nodes:
+            found |= set(node.value) if node.verb == "move" else {node.name} if node.verb in ("set", "count") else set()
+            called = self.subs[node.name] if node.verb == "call" else []
+            found |= self.may_set([*node.body, *node.other, *called])
+        return found
+
+    def perhaps(self, nodes: Sequence[Node], run: Callable[[], None], hangs: bool = True) -> None:
+        """``run``, which runs some of the statements; whether it does hangs on a doubt."""
+        self.doubts += hangs
+        run()
+        self.doubts -= hangs
+        if hangs:
+            self.unsure |= self.may_set(nodes)
+            self.called |= "call" in verbs_of(nodes)
 
     def branch(self, node: Node) -> None:
-        self.all(node.body if self.value(node.value) else node.other)
+        taken = node.body if self.value(node.value) else node.other
+        self.perhaps([*node.body, *node.other], lambda: self.all(taken), self.hangs(node.value))
 
     def loop(self, node: Node) -> None:
-        while self.value(node.value) and self.once(node.body):
-            pass
+        def passes() -> None:
+            while self.value(node.value) and self.once(node.body):
+                pass
+
+        self.perhaps(node.body, passes, self.hangs(node.value))
 
     def again(self, node: Node) -> None:
-        while self.once(node.body) and self.value(node.value):
-            pass
+        def passes() -> None:
+            while self.once(node.body) and self.value(node.value):
+                pass
+
+        self.perhaps(node.body, passes, self.hangs(node.value))
 
     def times(self, node: Node) -> None:
         for _ in range(node.value):
@@ -126,8 +173,8 @@ class Run:
             self.arguments = outer
 
     def doubt(self, node: Node) -> None:
-        for _ in range(min(next(self.answers), 1 if node.name != "while" else 2)):
-            self.all(node.body)
+        count = min(next(self.answers), 1 if node.name != "while" else 2)
+        self.perhaps(node.body, lambda: self.all(node.body * count))
 
 
 @dataclass(frozen=True)
@@ -257,9 +304,10 @@ class Writer:
     head = ""
     words = {"and": " AND ", "or": " OR "}
 
-    def __init__(self, tree: Tree, seed: int) -> None:
+    def __init__(self, tree: Tree, seed: int, first: str = "") -> None:
+        """``first``: lines before the others."""
         self.chance, self.tree = random.Random(seed), tree
-        self.lines = self.head.splitlines()
+        self.lines = (first + self.head).splitlines()
         self.nodes: dict[int, Node] = {}
         self.labels = 100
         self.loops: list[Any] = []
@@ -561,7 +609,8 @@ class Sinumerik(Writer):
             self.put(f"IF {self.expression(node.value)} GOTOB {label}")
 
     def times(self, node: Node) -> None:
-        if node.value < 2 or self.chance.random() < 0.5:
+        # what is repeated from a label is followed where all is decided alone
+        if "doubt" in verbs_of(self.tree.main) or node.value < 2 or self.chance.random() < 0.5:
             self.count(Node("count", node.name, 1, node.value, node.body))
             return
         first, last = f"L_{self.label()}", f"L_{self.label()}"
