@@ -6,10 +6,12 @@ in the text its condition is a variable without a value, or a slash.
 
 from __future__ import annotations
 
+import itertools
 import random
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 Expr = Any
 """A number; ("v", n) a variable, ("a", n) an argument, or (operator, left, right)."""
@@ -48,8 +50,13 @@ class Ran(NamedTuple):
     sure: bool
 
 
+def all_of(nodes: Sequence[Node]) -> list[Node]:
+    """The statements and those in them."""
+    return [*nodes, *(inner for node in nodes for inner in all_of([*node.body, *node.other]))]
+
+
 def verbs_of(nodes: Sequence[Node]) -> set[str]:
-    return {node.verb for node in nodes}.union(*(verbs_of([*node.body, *node.other]) for node in nodes))
+    return {node.verb for node in all_of(nodes)}
 
 
 class _Left(Exception):
@@ -69,7 +76,9 @@ class Run:
         """Variables and axes whose values hang on a doubt."""
         self.doubts = 0
         self.called = False
-        """Whether a subprogram was called in a doubt: what it leaves is not followed."""
+        """Whether a subprogram was called in a doubt: what it leaves, and how often it runs, is not followed."""
+        self.left = False
+        """Whether a loop or a subprogram is left in a doubt: all of it runs or not."""
 
     def value(self, text: Expr) -> Any:
         if not isinstance(text, tuple):
@@ -118,7 +127,13 @@ class Run:
         """Variables and axes that the statements set, if they run."""
         found: set[Any] = set()
         for node in nodes:
-            found |= set(node.value) if node.verb == "move" else {node.name} if node.verb in ("set", "count") else set()
+            found |= (
+                set(node.value)
+                if node.verb == "move"
+                else {node.name}
+                if node.verb in ("set", "count")
+                else set()
+            )
             called = self.subs[node.name] if node.verb == "call" else []
             found |= self.may_set([*node.body, *node.other, *called])
         return found
@@ -131,6 +146,7 @@ class Run:
         if hangs:
             self.unsure |= self.may_set(nodes)
             self.called |= "call" in verbs_of(nodes)
+            self.left |= "leave" in verbs_of(nodes)
 
     def branch(self, node: Node) -> None:
         taken = node.body if self.value(node.value) else node.other
@@ -166,14 +182,13 @@ class Run:
     def call(self, node: Node) -> None:
         for _ in range(node.last):
             outer, self.arguments = self.arguments, [self.value(one) for one in node.value]
-            try:
+            with suppress(_Left):
                 self.all(self.subs[node.name])
-            except _Left:
-                pass
             self.arguments = outer
 
     def doubt(self, node: Node) -> None:
         count = min(next(self.answers), 1 if node.name != "while" else 2)
+        self.left |= bool(node.last)
         self.perhaps(node.body, lambda: self.all(node.body * count))
 
 
@@ -183,9 +198,17 @@ class Tree:
     subs: list[list[Node]]
 
     def run(self, answers: Sequence[int] = ()) -> list[Ran]:
-        run = Run(self.subs, iter([*answers, *[0] * 1000]))
+        """The motions.  None is sure where a loop or a subprogram is left in a doubt; where a subprogram is called in
+        one, those of the main program alone that state their whole place before that call."""
+        run = Run(self.subs, itertools.cycle(answers or (0,)))
         run.all(self.main)
-        return run.motions
+        inside = {id(node) for sub in self.subs for node in all_of(sub)}
+        if run.left or (run.called and "doubt" in set().union(*map(verbs_of, self.subs))):
+            sure = set()
+        else:
+            sure = {id(ran.node) for ran in run.motions if not run.called or ran.node.name == "place"}
+            sure -= inside if run.called else set()
+        return [ran._replace(sure=ran.sure and id(ran.node) in sure) for ran in run.motions]
 
 
 class Drawing:
@@ -246,7 +269,10 @@ class Drawing:
             return [self.move(arguments)]
         if kind < 0.55:
             return [Node("set", self.chance.randrange(4), self.value(arguments))]
-        inner = lambda loop=inside: self.block(arguments, depth + 1, self.chance.randint(1, 2), subs, loop)  # noqa: E731
+
+        def inner(loop: str = inside) -> list[Node]:
+            return self.block(arguments, depth + 1, self.chance.randint(1, 2), subs, loop)
+
         if kind < 0.7:
             leaves = ("while" in inside and self.breaks) and self.chance.random() < 0.5
             body = inner()
@@ -261,15 +287,25 @@ class Drawing:
             return self.repeated(arguments, inner)
         if kind < 0.95 and subs:
             return [self.called(arguments, subs)]
-        if self.doubts and depth == 0:
+        if self.doubts and depth < 2:
             name = self.chance.choice(("if", "slash", "while"))
             body = [self.move(arguments)] if name == "slash" else inner("doubt")
-            return [Node("doubt", name, body=body)]
+            if name == "if" and self.chance.random() < 0.3:
+                if inside.startswith("sub"):
+                    body = [*body, Node("leave", "return")]
+                elif "while" in inside and self.breaks:
+                    body = [*body, Node("leave", "break")]
+            # a jump that may happen in a subprogram leaves the whole program in its order
+            jumps = self.control == "fanuc" and name == "if" and inside.startswith("sub")
+            return [Node("doubt", name, last=jumps, body=body)]
         return [self.move(arguments)]
 
     def called(self, arguments: int, subs: int) -> Node:
         which = self.chance.randrange(subs)
-        given = [self.value(arguments, 1) for _ in range(2 if which % 2 == 0 and self.control != "sinumerik" else 0)]
+        given = [
+            self.value(arguments, 1)
+            for _ in range(2 if which % 2 == 0 and self.control != "sinumerik" else 0)
+        ]
         many = self.chance.choice((1, 1, 2)) if not given else 1
         return Node("call", which, given, many)
 
@@ -290,7 +326,8 @@ class Drawing:
     def tree(self) -> Tree:
         count = self.chance.choice((0, 1, 2))
         subs = [
-            self.block(2 if n % 2 == 0 and self.control != "sinumerik" else 0, 1, 3, n, "sub") for n in range(count)
+            self.block(2 if n % 2 == 0 and self.control != "sinumerik" else 0, 1, 3, n, "sub")
+            for n in range(count)
         ]
         main = [Node("set", n, self.number()) for n in range(4)]
         for _ in range(self.chance.randint(2, 4)):
@@ -302,7 +339,7 @@ class Writer:
     """Writes a tree; ``lines``; ``nodes``: line, from 1 -> the motion in it."""
 
     head = ""
-    words = {"and": " AND ", "or": " OR "}
+    words: ClassVar[dict[str, str]] = {"and": " AND ", "or": " OR "}
 
     def __init__(self, tree: Tree, seed: int, first: str = "") -> None:
         """``first``: lines before the others."""
@@ -371,7 +408,7 @@ class Writer:
 
 class LinuxCNC(Writer):
     head = "G21 G90 G17 G54 G94\nT1 M6\nG0 X0 Y0 Z0\nF60"
-    words = {
+    words: ClassVar[dict[str, str]] = {
         "and": " AND ", "or": " OR ", "<": " LT ", "<=": " LE ", "==": " EQ ", ">": " GT ", ">=": " GE ",
         "!=": " NE ",
     }  # fmt: skip
@@ -444,7 +481,7 @@ class LinuxCNC(Writer):
 
 class Fanuc(Writer):
     head = "O1\nG21 G90 G17 G54 G94\nT1 M6\nG0 X0. Y0. Z0.\nF60."
-    words = {
+    words: ClassVar[dict[str, str]] = {
         "and": "AND", "or": "OR", "<": "LT", "<=": "LE", "==": "EQ", ">": "GT", ">=": "GE", "!=": "NE",
     }  # fmt: skip
 
@@ -542,7 +579,7 @@ class Fanuc(Writer):
 
 class Sinumerik(Writer):
     head = "G71 G90 G17 G54 G94\nT1 D1\nG0 X0 Y0 Z0\nF60"
-    words = {"and": " AND ", "or": " OR ", "!=": "<>"}
+    words: ClassVar[dict[str, str]] = {"and": " AND ", "or": " OR ", "!=": "<>"}
 
     def program(self) -> None:
         self.all(self.tree.main)

@@ -12,7 +12,7 @@ import pytest
 from gcode_flow_programs import WRITERS, Drawing, Tree, Writer
 from gcode_judge.misreadings import written as made_of
 from gcode_judge.oracle import MISSING, RS274, execute
-from test_gcode_followed import read
+from test_gcode_followed import HEAD, read, run
 
 from postproc.toolpath import Toolpath
 
@@ -76,9 +76,9 @@ def check_claims(tree: Tree, writer: Writer, path: Toolpath) -> None:
     runs = [lines_of(tree, writer, answers) for answers in ANSWERS]
     refused = refused_lines(path)
     claimed = {line: place for line, place in located(path) if line not in refused}
-    for run in runs:
-        places = dict(run)
-        often = Counter(line for line, _ in run)
+    for ran in runs:
+        places = dict(ran)
+        often = Counter(line for line, _ in ran)
         for line, place in claimed.items():
             assert (often[line], places.get(line)) == (1, place), f"line {line} of\n{writer.text}"
 
@@ -145,13 +145,17 @@ def otherwise(text: str, control: str, kind: str) -> str:
 def test_other_writings_of_a_program_run_alike(control: str, kind: str, seed: int) -> None:
     for doubts in (False, True):
         _, writer = drawn(control, seed, doubts)
-        paths = [read(control, text, "").toolpath for text in (writer.text, otherwise(writer.text, control, kind))]
+        paths = [
+            read(control, text, "").toolpath for text in (writer.text, otherwise(writer.text, control, kind))
+        ]
         assert located(paths[0]) == located(paths[1])
         assert refused_lines(paths[0]) == refused_lines(paths[1])
 
 
 @pytest.mark.skipif(RS274 is None, reason=MISSING)
-@pytest.mark.parametrize("batch", [0, pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "batch", [0, pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow)]
+)
 def test_linuxcnc_runs_the_trees_alike(batch: int, tmp_path: Path) -> None:
     """So that what is compared above is no error in common."""
     for seed in range(batch * 12, (batch + 1) * 12):
@@ -162,3 +166,93 @@ def test_linuxcnc_runs_the_trees_alike(batch: int, tmp_path: Path) -> None:
         assert [motion.line for motion in motions[1:]] == [line for line, _ in ran]
         ends = np.array([end for _, end in ran])
         np.testing.assert_allclose([motion.end for motion in motions[1:]], ends, atol=1e-3)
+
+
+BY_HAND = [
+    # how often a call runs is not known: it is no call that runs once
+    ("fanuc", "M98 P2 L#500\nG1 Y1.\nM30\nO2\nG91 G1 X1.\nG90\nM99\n", ["?*", "?*"]),
+    ("fanuc", "#1=2\nM98 P2 L#1\nG1 Y1.\nM30\nO2\nG91 G1 X1.\nG90\nM99\n", ["1 0 0*", "2 0 0*", "2 1 0"]),
+    ("fanuc", "M98 P2 L1.5\nG1 Y1.\nM30\nO2\nG91 G1 X1.\nG90\nM99\n", ["?*", "?*"]),
+    ("fanuc", "M98 P2 L-1\nG1 Y1.\nM30\nO2\nG91 G1 X1.\nG90\nM99\n", ["?*", "?*"]),
+    ("fanuc", "G65 P2 L#500\nG1 Y1.\nM30\nO2\nG91 G1 X1.\nG90\nM99\n", ["?*", "?*"]),
+    ("fanuc", "M97 P2 L#500\nG1 Y1.\nM30\nN2 G91 G1 X1.\nG90\nM99\n", ["?*", "?*"]),
+    ("sinumerik", "L5 P=R90\nG1 Y1\nM30\n%_N_L5_SPF\nG91 G1 X1\nG90\nM17\n", ["?*", "?*"]),
+    # of two counts none is the packed one
+    ("fanuc", "M98 P30003\nG1 Y1.\nM30\nO3\nG91 G1 X1.\nG90\nM99\n", ["1 0 0*", "2 0 0*", "3 0 0*", "3 1 0"]),
+    ("fanuc", "M98 P30003 L2\nG1 Y1.\nM30\nO3\nG91 G1 X1.\nG90\nM99\n", ["?*", "?*"]),
+    # from a block of the subprogram on
+    ("fanuc", "M98 P2 Q5\nG1 Y1.\nM30\nO2\nG1 X1.\nN5 G1 Z1.\nM99\n", ["?*", "?*", "?*"]),
+    ("fanuc", "M98 P2 Q#500\nG1 Y1.\nM30\nO2\nG1 X1.\nN5 G1 Z1.\nM99\n", ["?*", "?*", "?*"]),
+    # where a jump leads to
+    ("fanuc", "#100=7\nGOTO#100\nG1 X1.\nN7 G1 Y1.\nM30\n", ["0 1 0", "?*"]),
+    ("fanuc", "#100=7\nGOTO[#100+1]\nG1 X1.\nN8 G1 Y1.\nM30\n", ["0 1 0", "?*"]),
+    ("fanuc", "GOTO#500\nG1 X1.\nN8 G1 Y1.\nM30\n", ["?*", "?*"]),
+    (
+        "sinumerik", "G1 X1\nR1=2\nCASE R1 OF 1 GOTOF A1 2 GOTOF B1 DEFAULT GOTOF C1\nA1: G1 X5\nB1: G1 X7\n"
+        "C1: G1 X3 Y1\n", ["1 0 0", "?*", "?*", "3 1 0"],
+    ),
+    (
+        "sinumerik", "G1 X1\nR1=2\nCASE R1 OF 1 GOTOF A1 2 GOTOF \"B\"<<R1\nA1: G1 X5\nB2: G1 X7\n",
+        ["?*", "?*", "?*"],
+    ),
+    ("sinumerik", "A1: G1 X=IC(1)\nG1 X=IC(1)\nIF R90>1 GOTOB A1\nG1 Y1\nA1: G1 Z1\n", ["?*", "?*", "?*", "?*"]),
+    # a slash before a call of LinuxCNC
+    ("linuxcnc", "G1 X5\nO1 SUB\nG91\nO1 ENDSUB\n/O1 CALL\nG1 X2 Y2 Z2\n", ["5 0 0", "?*"]),
+    ("linuxcnc", "G1 X5\nO1 SUB\nG91\nO1 ENDSUB\n / O1 CALL\nG1 X2 Y2 Z2\n", ["5 0 0", "?*"]),
+    ("linuxcnc", "#101=4\nO1 SUB\n#101=2\nO1 ENDSUB\n/O1 CALL\nG1 X#101\n", ["?*"]),
+    # what a subprogram gives back, and what it sees
+    ("linuxcnc", "O1 SUB\nO1 ENDSUB [#1+2]\nO1 CALL [3]\nG1 X#<_value>\n", ["5 0 0"]),
+    (
+        "linuxcnc", "O1 SUB\nO2 IF [#1 EQ 3]\nO1 RETURN [7]\nO2 ENDIF\nO1 ENDSUB [#1+2]\nO1 CALL [3]\n"
+        "G1 X#<_value>\nO1 CALL [4]\nY#<_value>\n", ["7 0 0", "7 6 0"],
+    ),
+    ("linuxcnc", "O<Hole> SUB\n#<d>=#1\nG1 Z-#<d>\nO<hole> ENDSUB\no<hole> call [3]\n", ["0 0 -3"]),
+    ("linuxcnc", "#<d>=2\nO1 SUB\n#<d>=4\nO1 ENDSUB\nO1 CALL\nG1 X#<d>\n", ["2 0 0"]),
+    ("linuxcnc", "#<_d>=2\nO1 SUB\n#<_d>=4\nO1 ENDSUB\nO1 CALL\nG1 X#<_d>\n", ["4 0 0"]),
+    ("linuxcnc", "#30=2\n#31=2\nO1 SUB\n#30=4\n#31=4\nO1 ENDSUB\nO1 CALL\nG1 X#30 Y#31\n", ["2 4 0"]),
+    ("fanuc", "#33=2.\n#100=2.\nG65 P2\nG1 X#33 Y#100\nM30\nO2\n#33=4.\n#100=4.\nM99\n", ["2 4 0"]),
+    ("fanuc", "#1=4.\nM98 P2\nG1 X#1\nM30\nO2\n#1=9.\nM99\n", ["9 0 0"]),
+    ("sinumerik", "R1=1\nL5\nG1 X=R1\nM30\n%_N_L5_SPF\nR1=2\nM17\n", ["2 0 0"]),
+    ("sinumerik", "DEF REAL _A=1\nL5\nG1 X=_A\nM30\n%_N_L5_SPF\nDEF REAL _A=4\nG1 Y=_A\nM17\n", ["0 4 0", "1 4 0"]),
+    ("sinumerik", "PART\nG1 X1\nM30\n%_N_PART_SPF\nG1 Y4\nRET\n", ["0 4 0", "1 4 0"]),
+    # the arguments of G65: the variables of their letters
+    *(
+        ("fanuc", f"G65 P2 {letter}5.\nM30\nO2\nG1 X#{number}\nM99\n", ["5 0 0"])
+        for letter, number in zip("DEFHIJKMQRSTUVWXYZ", (7, 8, 9, 11, 4, 5, 6, 13, *range(17, 27)), strict=True)
+    ),
+    # parts that are repeated
+    ("sinumerik", "A1:\nG1 X=IC(1)\nENDLABEL:\nG1 X5\nREPEAT A1 P=2\nG1 Y1\n",
+     ["1 0 0*", "5 0 0", "6 0 0*", "7 0 0*", "7 1 0"]),
+    ("sinumerik", "A1: G1 X=IC(1)\nG1 Y=IC(1)\nREPEATB A1 P=2\nG1 Z1\n",
+     ["1 0 0*", "1 1 0", "2 1 0*", "3 1 0*", "3 1 1"]),
+    ("sinumerik", "A1:\nG1 X=IC(1)\nREPEAT A1\nG1 Y1\n", ["1 0 0*", "2 0 0*", "2 1 0"]),
+    ("sinumerik", "A1:\nG1 X=IC(1)\nB1:\nG1 Z1\nREPEAT A1 B1 P=0\nG1 Z3\n", ["1 0 0", "1 0 1", "1 0 3"]),
+    ("sinumerik", "A1:\nG1 X=IC(1)\nREPEAT A1 P=R90\nG1 X3 Y1 Z2\n", ["?*", "3 1 2"]),
+    # LinuxCNC after a BREAK of a REPEAT, and CONTINUE of a DO
+    ("linuxcnc", "#1=0\nO1 REPEAT [3]\nG1 X1\nO2 IF [#1 EQ 0]\nO1 BREAK\nO2 ENDIF\nO1 ENDREPEAT\nG1 X2 Y1 Z3\n",
+     ["?*", "2 1 3"]),
+    ("linuxcnc", "#1=0\nO1 DO\n#1=[#1+1]\nO2 IF [#1 EQ 2]\nO1 CONTINUE\nO2 ENDIF\nG1 X#1\nO1 WHILE [#1 LT 3]\nG1 Y1\n",
+     ["1 0 0*", "3 0 0*", "3 1 0"]),
+    # what a block that may not run sets alone is not known
+    ("fanuc", "#1=1.\n#2=2.\n/#1=7.\nG1 Y#2\nX#1\n", ["0 2 0", "?*"]),
+    ("fanuc", "#1=1.\n#2=2.\nIF[#500GT1]THEN #1=7.\nG1 Y#2\nX#1\n", ["0 2 0", "?*"]),
+    ("fanuc", "#2=2.\n/M98 P2\nG1 X#2\nM30\nO2\n#2=3.\nM99\n", ["?*"]),
+]  # fmt: skip
+"""Control, program, and the ends of its motions as the controls' manuals have them."""
+
+
+@pytest.mark.parametrize(("control", "text", "ends"), BY_HAND)
+def test_flow_by_hand(control: str, text: str, ends: list[str]) -> None:
+    assert run(control, text) == ends
+
+
+@pytest.mark.skipif(RS274 is None, reason=MISSING)
+def test_linuxcnc_runs_what_is_derived_by_hand(tmp_path: Path) -> None:
+    """Up to the first motion that is not known."""
+    for control, text, ends in BY_HAND:
+        if control == "linuxcnc":
+            motions = execute(made_of(HEAD[control] + text + "M2\n"), tmp_path)
+            assert motions is not None, text
+            known = list(itertools.takewhile(lambda end: "?" not in end, ends))
+            found = [" ".join(f"{value + 0.0:g}" for value in np.round(one.end, 3)) for one in motions[1:]]
+            assert found[: len(known)] == [end.rstrip("*") for end in known], text

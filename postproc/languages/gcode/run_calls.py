@@ -89,25 +89,19 @@ class RunCalls(RunState):
             part = self.labels.program(statement.label)
             return None if part is None else (*part, 1, self.variables.own())
         if verb == "named":
-            number = self.word(block, "L")
+            number, runs = self.word(block, "L"), self.runs(block, "P")
             part = self.labels.program(f"L{number:.0f}") if not math.isnan(number) else None
-            count = self.word(block, "P")
-            return (
-                None
-                if part is None
-                else (*part, 1 if math.isnan(count) else int(count), self.variables.own())
-            )
-        number, count = self.word(block, "P"), self.word(block, "L")
-        if verb == "call" and not math.isnan(self.word(block, "Q")):
+            return None if part is None or runs is None else (*part, runs, self.variables.own())
+        number, runs = self.word(block, "P"), self.runs(block, "L")
+        if verb == "call" and self.last_word(block, "Q") >= 0:
             return None  # it starts at a block of the subprogram
-        if math.isnan(number) or number != math.floor(number):
+        if math.isnan(number) or number != math.floor(number) or runs is None:
             return None
-        runs = 1 if math.isnan(count) else int(count)
         if verb == "local":
             start = self.labels.number(int(number), block)
             return None if start is None else (start, self.n, runs, None)
         part = self.labels.program(f"{number:.0f}")
-        if part is None and number >= PACKED and math.isnan(count):
+        if part is None and number >= PACKED and self.last_word(block, "L") < 0:
             runs, part = int(number) // PACKED, self.labels.program(f"{int(number) % PACKED}")
         if part is None:
             return None
@@ -116,6 +110,13 @@ class RunCalls(RunState):
             given = {f"#{_ARGUMENTS[one]}": value for one, value in words.items() if not math.isnan(value)}
             return (*part, runs, given)
         return (*part, runs, None)
+
+    def runs(self, block: int, letter: str) -> int | None:
+        """How often a call runs, by the word of this letter; None where that is not known."""
+        if self.last_word(block, letter) < 0:
+            return 1
+        count = self.word(block, letter)
+        return int(count) if count >= 0 and count == math.floor(count) else None
 
     def called_label(self, statement: FlowStatement) -> str:
         """What a call names; O#1 and O[#1+1] with the number that they give."""
