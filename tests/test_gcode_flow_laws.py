@@ -198,7 +198,7 @@ BY_HAND = [
     ("sinumerik", "A1: G1 X=IC(1)\nG1 X=IC(1)\nIF R90>1 GOTOB A1\nG1 Y1\nA1: G1 Z1\n", ["?*", "?*", "?*", "?*"]),
     # a slash before a call of LinuxCNC
     ("linuxcnc", "G1 X5\nO1 SUB\nG91\nO1 ENDSUB\n/O1 CALL\nG1 X2 Y2 Z2\n", ["5 0 0", "?*"]),
-    ("linuxcnc", "G1 X5\nO1 SUB\nG91\nO1 ENDSUB\n / O1 CALL\nG1 X2 Y2 Z2\n", ["5 0 0", "?*"]),
+    ("linuxcnc", "G1 X5\nO1 SUB\nG91\nO1 ENDSUB\n/ O1 CALL\nG1 X2 Y2 Z2\n", ["5 0 0", "?*"]),
     ("linuxcnc", "#101=4\nO1 SUB\n#101=2\nO1 ENDSUB\n/O1 CALL\nG1 X#101\n", ["?*"]),
     # what a subprogram gives back, and what it sees
     ("linuxcnc", "O1 SUB\nO1 ENDSUB [#1+2]\nO1 CALL [3]\nG1 X#<_value>\n", ["5 0 0"]),
