@@ -112,6 +112,13 @@ def test_what_a_table_says_may_be_met_by_every_test(tree):
     probes = Probes(tree, [*mutants(tree, "thing.py"), *of_table])
     count = len(mutants(tree, "thing.py"))
     assert probes.of_tables == set(range(count, count + len(of_table)))
+    assert probes.at_import["table"] == probes.of_tables
+    lines = {
+        mutant.line
+        for number, mutant in enumerate(mutants(tree, "thing.py"))
+        if number in probes.at_import["thing"]
+    }
+    assert lines == {4, 9, 12}
 
 
 def test_a_test_is_near_what_its_helpers_import(tree):
