@@ -180,7 +180,7 @@ def _result(run: RunFlow, stop: int, followed: bool, own: int | None = None) -> 
     called[run.called], entered[run.entered] = True, True
     if not same:
         entered[:-1] |= np.diff(order, prepend=-1) != 1
-    held = np.array(sorted(step for step, holds in run.taken.items() if holds), np.int64)
+    held = np.array(run.held, np.int64)
     source = run.source if same and not len(held) else run.source.in_order(order, held)
     source = source.with_values(folded.step, folded.key, folded.nth, folded.value, folded.how)
     return Execution(

@@ -47,7 +47,7 @@ class RunFlow(RunCalls):
             if holds == 0:
                 return block + 1
             if not math.isnan(holds):
-                self.taken[self.count] = True
+                self.held.append(self.count)
                 return self.certain(block, statement)
         if block in self.deleted:
             return self.perhaps(block, statement)

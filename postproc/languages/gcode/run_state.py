@@ -80,7 +80,7 @@ class RunState:
         self.ranges: list[tuple[int, int, bool]] = []
         self.count = 0
         self.rows: list[tuple[int, int, int, float, int]] = []
-        self.taken: dict[int, bool] = {}  # step of a block after a condition -> whether that holds
+        self.held: list[int] = []  # steps of blocks after a condition that holds
         self.called: list[int] = []
         self.entered: list[int] = []
         self.unknown: dict[str, int] = {}
