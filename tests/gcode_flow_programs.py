@@ -43,11 +43,13 @@ class Node:
 
 
 class Ran(NamedTuple):
-    """A motion that ran: its statement, where it ended, and whether nothing of that hangs on a doubt."""
+    """A motion that ran: its statement, where it ended, whether nothing of that hangs on a doubt, and the number of the
+    comment that was passed last."""
 
     node: Node
     end: tuple[float, float, float]
     sure: bool
+    said: int
 
 
 def all_of(nodes: Sequence[Node]) -> list[Node]:
@@ -75,6 +77,7 @@ class Run:
         self.unsure: set[Any] = set()
         """Variables and axes whose values hang on a doubt."""
         self.doubts = 0
+        self.said = 0
         self.called = False
         """Whether a subprogram was called in a doubt: what it leaves, and how often it runs, is not followed."""
         self.left = False
@@ -108,7 +111,10 @@ class Run:
             self.here[axis] = self.value(value)
             self.note(axis, value)
         sure = not self.doubts and not self.called and not self.unsure & {"X", "Y", "Z"}
-        self.motions.append(Ran(node, (self.here["X"], self.here["Y"], self.here["Z"]), sure))
+        self.motions.append(Ran(node, (self.here["X"], self.here["Y"], self.here["Z"]), sure, self.said))
+
+    def say(self, node: Node) -> None:
+        self.said = node.name
 
     def set(self, node: Node) -> None:
         self.values[node.name] = self.value(node.value)
@@ -216,7 +222,7 @@ class Drawing:
 
     def __init__(self, seed: int, control: str, doubts: bool = False) -> None:
         self.chance, self.control, self.doubts = random.Random(seed), control, doubts
-        self.counters = 10
+        self.counters, self.comments = 10, 0
         self.breaks = self.chance.random() < 0.5
         """With the BREAK of a WHILE, LinuxCNC ends the next DO."""
 
@@ -252,6 +258,13 @@ class Drawing:
         """A motion that states where it ends by numbers alone."""
         return Node("move", "place", {axis: self.number() for axis in "XYZ"})
 
+    def comment(self) -> list[Node]:
+        """Before or behind a statement, at times, a comment of its own number."""
+        if self.chance.random() > 0.15:
+            return []
+        self.comments += 1
+        return [Node("say", self.comments)]
+
     def counted(self) -> int:
         """A variable of a loop's own."""
         self.counters += 1
@@ -266,7 +279,7 @@ class Drawing:
     def statement(self, arguments: int, depth: int, subs: int, inside: str) -> list[Node]:
         kind = self.chance.random()
         if depth > 2 or kind < 0.4:
-            return [self.move(arguments)]
+            return [*self.comment(), self.move(arguments), *self.comment()]
         if kind < 0.55:
             return [Node("set", self.chance.randrange(4), self.value(arguments))]
 
@@ -339,6 +352,7 @@ class Writer:
     """Writes a tree; ``lines``; ``nodes``: line, from 1 -> the motion in it."""
 
     head = ""
+    comment = "({})"
     words: ClassVar[dict[str, str]] = {"and": " AND ", "or": " OR "}
 
     def __init__(self, tree: Tree, seed: int, first: str = "") -> None:
@@ -392,6 +406,9 @@ class Writer:
 
     def move(self, node: Node) -> None:
         self.motion(node)
+
+    def say(self, node: Node) -> None:
+        self.put(self.comment.format(f"FORCE 0 0 {node.name}"))
 
     def doubt(self, node: Node) -> None:
         if node.name == "slash":
@@ -579,6 +596,7 @@ class Fanuc(Writer):
 
 class Sinumerik(Writer):
     head = "G71 G90 G17 G54 G94\nT1 D1\nG0 X0 Y0 Z0\nF60"
+    comment = ";{}"
     words: ClassVar[dict[str, str]] = {"and": " AND ", "or": " OR ", "!=": "<>"}
 
     def program(self) -> None:

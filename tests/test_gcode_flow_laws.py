@@ -67,6 +67,20 @@ def test_what_is_decided_runs_as_the_tree_says(control: str, batch: int) -> None
         assert refused_lines(path) == {line for line in writer.nodes if often[line] != 1}, writer.text
 
 
+@CONTROLS
+@BATCHES
+def test_comments_are_passed_as_often_as_the_tree_says(control: str, batch: int) -> None:
+    """The one in force at each motion is that which the run passed last."""
+    for tree, writer in batch_of(control, batch, False):
+        path = read(control, writer.text, "").toolpath
+        said = {note.row: note.text.rpartition(" ")[2] for note in path.annotations}
+        last, found = 0, []
+        for row in range(len(located(path, 0))):
+            last = int(said.get(row, last))
+            found.append(last)
+        assert found[1:] == [ran.said for ran in tree.run()], writer.text
+
+
 ANSWERS = [answers * 4 for answers in itertools.product((0, 1, 2), repeat=3)]
 """How often what may run or not runs: none, all, and mixed."""
 

@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from postproc.base.arrays import Bools, Ints
+from postproc.base.arrays import Ints
 from postproc.base.document import Document, Span
 from postproc.languages.core.comments_in_force import SPEAKS
 from postproc.languages.dialect import MARK
+from postproc.languages.gcode.execution import Execution
 from postproc.languages.gcode.source import Source
 from postproc.toolpath import Annotation
 from postproc.toolpath.meant_comments import meant_to_speak
@@ -32,16 +33,15 @@ class Remarks(NamedTuple):
     marker_at: Span
 
 
-def remarks(
-    document: Document, source: Source, steps: Ints, in_text_order: bool, in_other_file: Bools
-) -> Remarks:
-    """``steps`` (N,): blocks of ``source`` that are the motions; in_other_file (B,): those of other files."""
+def remarks(document: Document, source: Source, steps: Ints, execution: Execution) -> Remarks:
+    """``steps`` (N,): blocks of ``source`` that are the motions."""
     raw, run = document.raw, source.blocks.line
     comments = source.comments
-    if in_text_order:
+    if execution.order is None:
         rows = np.searchsorted(run[steps], comments[:, 2])
     else:
-        comments, rows = _passed(comments, run, steps, in_other_file)
+        which, at = _passed(comments, execution.text.blocks.line, execution.order, execution)
+        comments, rows = comments[which], np.searchsorted(steps, at)
     marker = _marker(raw, source.comments)
     spans, lines = comments[:, :2], comments[:, 2]
     alone = ~np.isin(lines, source.blocks.line[source.blocks.wordy]) if len(lines) else lines
@@ -73,20 +73,34 @@ def _marker(raw: bytes, comments: Ints) -> Span | None:
     return next((Span(0, *span) for span in spans if _text(raw[slice(*span)]).startswith(MARK)), None)
 
 
-def _passed(comments: Ints, run: Ints, steps: Ints, in_other_file: Bools) -> tuple[Ints, Ints]:
-    """The comments in the order in which the run passes them, each as often as it does; the motions after them."""
-    if not len(comments) or not len(run):
-        return comments, comments[:, 2]
-    lines = comments[:, 2]
-    cuts = np.flatnonzero((np.diff(run) <= 0) & ~in_other_file[1:]) + 1
-    which, at = [], []
-    for start, stop in zip(np.append(0, cuts).tolist(), np.append(cuts, len(run)).tolist(), strict=True):
-        low, high = np.searchsorted(lines, [run[start], run[stop - 1] + 1]).tolist()
-        if start == 0 and run[0] == run.min():
-            low = 0  # those at the head of the file
-        which.append(np.arange(low, high))
-        at.append(start + np.searchsorted(run[start:stop], lines[low:high]))
-    return comments[np.concatenate(which)], np.searchsorted(steps, np.concatenate(at))
+def _passed(comments: Ints, lines: Ints, order: Ints, execution: Execution) -> tuple[Ints, Ints]:
+    """(K,) the comments in the order in which the run passes them, each as often as it does, and (K,) the steps before
+    which it does; comments (C, 3); lines (T,): of the blocks as they are written, of which ``order`` (E,) runs one a
+    step.
+
+    A comment is passed before the block of its line, or before the next one, where that is not reached by a jump."""
+    block = np.searchsorted(lines, comments[:, 2])
+    inside = np.flatnonzero(block < len(lines))
+    alone = np.ones(len(comments), np.bool_)
+    alone[inside] = lines[block[inside]] != comments[inside, 2]
+    jumped = np.zeros(len(order) + 1, np.bool_)
+    jumped[execution.jumped] = True
+    by_block = np.argsort(order, kind="stable")
+    first, behind = (np.searchsorted(order[by_block], block, side=side) for side in ("left", "right"))
+    often = behind - first
+    which = np.repeat(np.arange(len(comments)), often)
+    at = by_block[np.arange(len(which)) + np.repeat(first - np.cumsum(often) + often, often)]
+    passes = ~(alone[which] & jumped[at])
+    found = [np.stack([which[passes], at[passes]], axis=1)]
+    before: dict[int, list[int]] = {}
+    for comment in np.flatnonzero(alone).tolist():
+        before.setdefault(int(block[comment]), []).append(comment)
+    for step, reached in execution.reached.tolist():
+        if reached in before:
+            found.append(np.array([[comment, step] for comment in before[reached]]))
+    passed = np.concatenate(found)
+    passed = passed[np.lexsort((passed[:, 0], passed[:, 1]))]
+    return passed[:, 0], passed[:, 1]
 
 
 def head(raw: bytes) -> int:

@@ -8,7 +8,7 @@ place and is marked: what it assigns is unknown after it.  A flow that cannot be
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -59,7 +59,9 @@ class Execution:
     (E,): the block of the text of each; None where that is the order of the text.  followed: loops, branches and
     calls are; reason (E,) FlowReason where they are.  tape (E,): the block belongs to the program.  called (E,):
     the step calls a subprogram that is followed.  entered (E,): a jump leads to the block.  repeated (E,): the
-    block runs in other steps as well.  folded: the words whose values are put in.  unknown: names whose value was
+    block runs in other steps as well.  jumped (J,): steps that a jump leads to, past what is written before their
+    block; reached (R, 2): steps before which the run comes to a block that does not run then, and that block.
+    folded: the words whose values are put in.  unknown: names whose value was
     wanted and is not known, and the block where it was first.  missing: names of programs that are called and are not
     in the text."""
 
@@ -75,6 +77,8 @@ class Execution:
     folded: FoldedWords
     unknown: Mapping[str, int]
     missing: frozenset[str] = frozenset()
+    jumped: Ints = field(default_factory=lambda: np.empty(0, np.int64))
+    reached: Ints = field(default_factory=lambda: np.empty((0, 2), np.int64))
 
 
 def execute(
@@ -196,4 +200,6 @@ def _result(run: RunFlow, stop: int, followed: bool, own: int | None = None) -> 
         folded,
         run.unknown,
         frozenset(run.missing),
+        np.array(run.jumped, np.int64),
+        np.array(run.reached, np.int64).reshape(-1, 2),
     )

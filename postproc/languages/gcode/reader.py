@@ -133,7 +133,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         collector.refuse(np.ones(len(rows), np.bool_), "GCO026", message)
     refused = collector.done(document, line, start, lines.first[rows])
     frame_of_base, frame_of_tool, cell_frames = references(base, tool[rows], line, offset.stated)
-    said = remarks(document, source, rows, execution.order is None, foreign)
+    said = remarks(document, source, rows, execution)
     state = {name: found.take_column(name) for name in STATE}
     inverse_time = state["feed_mode"] == Feed.INVERSE_TIME
     drilled = found.take_column("drills")

@@ -47,8 +47,15 @@ class RunCalls(RunState):
         self.called.append(step)
         if count < 1:
             return block + 1
-        self.frames.append(CallFrame(block + 1, start, stop, count, block, outer))
-        return start
+        self.frames.append(CallFrame(block + 1, start, stop, count, block, outer, jumps=verb == "local"))
+        return self.enter_part()
+
+    def enter_part(self) -> int:
+        """The start of what is called or repeated."""
+        frame = self.frames[-1]
+        if frame.jumps:
+            self.jumped.append(self.count)
+        return frame.start
 
     def perhaps_call(self, block: int, verb: str, statement: FlowStatement | None) -> None:
         """A call that may run or not: the blocks of what it calls may run more often than they are followed."""
@@ -136,7 +143,7 @@ class RunCalls(RunState):
         frame = self.frames[-1]
         frame.count -= 1
         if frame.count > 0:
-            return frame.start
+            return self.enter_part()
         self.frames.pop()
         if frame.locals is not None:
             self.variables.leave(frame.locals)
@@ -163,8 +170,9 @@ class RunCalls(RunState):
             if count < 1:
                 return block + 1
             raise NotFollowed
-        self.frames.append(CallFrame(block + 1, start, stop, int(count), block, None))
-        return start
+        through = statement.direction != "B"
+        self.frames.append(CallFrame(block + 1, start, stop, int(count), block, None, True, through))
+        return self.enter_part()
 
     def hide(self, block: int) -> None:
         """Has the program followed again, with what a block opens or calls as what may run or not.  Raises RunAgain."""

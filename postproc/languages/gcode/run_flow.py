@@ -24,6 +24,8 @@ class RunFlow(RunCalls):
                 self.emit(at, min(limit, self.n))
                 if not self.frames:
                     return limit
+                if self.frames[-1].through:
+                    self.reached.append((self.count, limit))
                 if limit >= self.n:  # a subprogram without an end
                     raise NotFollowed
                 at = self.leave()
@@ -45,6 +47,7 @@ class RunFlow(RunCalls):
         if block in self.conditions:
             holds = self.value(self.conditions[block][0], block)
             if holds == 0:
+                self.reached.append((self.count, block))
                 return block + 1
             if not math.isnan(holds):
                 self.held.append(self.count)
@@ -101,6 +104,7 @@ class RunFlow(RunCalls):
             return self.maybe(around)
         if verb == Verb.SUB:
             assert around is not None
+            self.emit(block, block + 1)
             return around.stop + 1
         if verb == Verb.CALL:
             return self.call(block, "call", self.count)
@@ -114,6 +118,7 @@ class RunFlow(RunCalls):
         if verb == Verb.RETURN:
             if not self.frames:
                 raise NotFollowed
+            self.emit(block, block + 1)
             self.returned(statement)
             return self.leave()
         if verb == Verb.BREAK:
@@ -122,12 +127,14 @@ class RunFlow(RunCalls):
             return around.stop + 1
         if verb == Verb.CONTINUE:
             if around.verb != Verb.WHILE:
+                self.jumped.append(self.count)
                 return around.stop
             self.emit(block, block + 1)
             return self.loop(around, self.shape.statements[around.stop])
         if around.verb == Verb.SUB:
             if not self.frames:
                 raise NotFollowed
+            self.emit(block, block + 1)
             self.returned(statement)
             return self.leave()
         self.emit(block, block + 1)
@@ -248,6 +255,7 @@ class RunFlow(RunCalls):
         if target is None:
             raise NotFollowed
         self.entered.append(self.count)
+        self.jumped.append(self.count)
         return target
 
     def computed(self, statement: FlowStatement) -> FlowStatement:
