@@ -75,7 +75,7 @@ class Run:
         self.here = {"X": 0.0, "Y": 0.0, "Z": 0.0}
         self.motions: list[Ran] = []
         self.unsure: set[Any] = set()
-        """Variables and axes whose values hang on a doubt."""
+        """Variables and axes whose values hang on a doubt, and "said", where the last comment does."""
         self.doubts = 0
         self.said = 0
         self.called = False
@@ -110,11 +110,12 @@ class Run:
         for axis, value in node.value.items():
             self.here[axis] = self.value(value)
             self.note(axis, value)
-        sure = not self.doubts and not self.called and not self.unsure & {"X", "Y", "Z"}
+        sure = not self.doubts and not self.called and not self.unsure & {"X", "Y", "Z", "said"}
         self.motions.append(Ran(node, (self.here["X"], self.here["Y"], self.here["Z"]), sure, self.said))
 
     def say(self, node: Node) -> None:
         self.said = node.name
+        self.note("said", 0)
 
     def set(self, node: Node) -> None:
         self.values[node.name] = self.value(node.value)
@@ -130,18 +131,13 @@ class Run:
         return text[1] in self.unsure if text[0] == "v" else any(map(self.hangs, text[1:]))
 
     def may_set(self, nodes: Sequence[Node]) -> set[Any]:
-        """Variables and axes that the statements set, if they run."""
+        """Variables, axes and what was said last, as far as the statements set them, if they run."""
         found: set[Any] = set()
-        for node in nodes:
-            found |= (
-                set(node.value)
-                if node.verb == "move"
-                else {node.name}
-                if node.verb in ("set", "count")
-                else set()
-            )
-            called = self.subs[node.name] if node.verb == "call" else []
-            found |= self.may_set([*node.body, *node.other, *called])
+        for node in all_of(nodes):
+            found |= {"said"} if node.verb == "say" else set()
+            found |= set(node.value) if node.verb == "move" else set()
+            found |= {node.name} if node.verb in ("set", "count") else set()
+            found |= self.may_set(self.subs[node.name]) if node.verb == "call" else set()
         return found
 
     def perhaps(self, nodes: Sequence[Node], run: Callable[[], None], hangs: bool = True) -> None:

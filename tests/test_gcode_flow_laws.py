@@ -117,6 +117,22 @@ def test_what_is_claimed_beside_what_may_run_or_not_is_so_in_every_run(control: 
 
 @CONTROLS
 @BATCHES
+def test_the_force_of_what_is_claimed_is_so_in_every_run(control: str, batch: int) -> None:
+    """The comment in force at a motion that can be corrected is that which every run passes last before it."""
+    for tree, writer in batch_of(control, batch, True):
+        path = read(control, writer.text, "").toolpath
+        lines = {id(node): line for line, node in writer.nodes.items()}
+        every = [{lines[id(ran.node)]: ran.said for ran in tree.run(answers)} for answers in ANSWERS]
+        said = {note.row: int(note.text.rpartition(" ")[2]) for note in path.annotations}
+        last = 0
+        for row in range(len(path)):
+            last, line = said.get(row, last), int(path.line[row])
+            if line in lines.values() and row not in path.constraints.refused:
+                assert {one[line] for one in every} == {last}, f"line {line} of\n{writer.text}"
+
+
+@CONTROLS
+@BATCHES
 def test_what_hangs_on_nothing_uncertain_is_known(control: str, batch: int) -> None:
     """But behind a call that may happen or not: what it leaves is not followed."""
     for tree, writer in batch_of(control, batch, True):

@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from postproc.base.arrays import Ints
+from postproc.base.arrays import Bools, Ints
 from postproc.base.document import Document, Span
 from postproc.languages.core.comments_in_force import SPEAKS
 from postproc.languages.dialect import MARK
 from postproc.languages.gcode.execution import Execution
+from postproc.languages.gcode.execution_flow import ExecutionFlow, FlowReason
 from postproc.languages.gcode.source import Source
 from postproc.toolpath import Annotation
 from postproc.toolpath.meant_comments import meant_to_speak
@@ -31,13 +32,18 @@ class Remarks(NamedTuple):
     comments: tuple[Annotation, ...]
     marker: Span | None
     marker_at: Span
+    varying: Bools
+    """(N,) motions at which it differs with the path of the program which FORCE or COMPENSATE comment is in force."""
 
 
-def remarks(document: Document, source: Source, steps: Ints, execution: Execution) -> Remarks:
+def remarks(
+    document: Document, source: Source, steps: Ints, execution: Execution, flow: ExecutionFlow
+) -> Remarks:
     """``steps`` (N,): blocks of ``source`` that are the motions."""
     raw, run = document.raw, source.blocks.line
     comments = source.comments
     if execution.order is None:
+        at = np.searchsorted(run, comments[:, 2])
         rows = np.searchsorted(run[steps], comments[:, 2])
     else:
         which, at = _passed(comments, execution.text.blocks.line, execution.order, execution)
@@ -45,19 +51,61 @@ def remarks(document: Document, source: Source, steps: Ints, execution: Executio
     marker = _marker(raw, source.comments)
     spans, lines = comments[:, :2], comments[:, 2]
     alone = ~np.isin(lines, source.blocks.line[source.blocks.wordy]) if len(lines) else lines
-    speaking, others = [], []
-    for (start, stop), number, row, own in zip(
-        spans.tolist(), lines.tolist(), rows.tolist(), alone.tolist(), strict=True
+    speaking, others, doubted = [], [], []
+    for (start, stop), number, row, own, doubt in zip(
+        spans.tolist(),
+        lines.tolist(),
+        rows.tolist(),
+        alone.tolist(),
+        _doubted(at, alone, execution, flow).tolist(),
+        strict=True,
     ):
         said = _text(raw[start:stop])
         if marker is not None and start == marker.start:
             continue
         if SPEAKS.match(said):
             speaking.append(Annotation(row, said, number))
+            doubted.append(doubt)
         elif said and (own or meant_to_speak(said)):
             others.append(Annotation(row, said, number))
-    at = head(raw)
-    return Remarks(tuple(speaking), tuple(others), marker, Span(0, at, at))
+    first = head(raw)
+    varying = _varying(speaking, doubted, len(steps))
+    return Remarks(tuple(speaking), tuple(others), marker, Span(0, first, first), varying)
+
+
+def _doubted(at: Ints, alone: Bools, execution: Execution, flow: ExecutionFlow) -> Bools:
+    """(C,) comments, at steps ``at`` (C,), that the run may pass or not; alone (C,): no words are in their line."""
+    n = len(flow.reason)
+    uncertain = np.append(np.isin(flow.reason, (FlowReason.FLOW, FlowReason.DELETED)), False)
+    if execution.followed:
+        edge = np.zeros(n + 2, np.int32)
+        np.add.at(edge, execution.perhaps[:, 0], 1)
+        np.add.at(edge, execution.perhaps[:, 1] + 1, -1)
+        before = np.cumsum(edge)[: n + 1] > 0
+    else:
+        inside = np.append(flow.reason == FlowReason.FLOW, False)
+        before = (inside & np.append(False, inside[:-1])) | np.append(flow.entered, False)
+    return np.asarray(np.where(alone.astype(bool), before[at], uncertain[at]))
+
+
+def _varying(speaking: list[Annotation], doubted: list[bool], count: int) -> Bools:
+    """(N,) see ``Remarks.varying``: behind a comment that may be passed or not, up to one that is."""
+    edge = np.zeros(count + 1, np.int32)
+    for word in ("FORCE", "COMPENSATE"):
+        since, said = -1, ""
+        for one, doubt in zip(speaking, doubted, strict=True):
+            if not one.text.upper().startswith(word):
+                continue
+            if not doubt:
+                if since >= 0:
+                    edge[since] += 1
+                    edge[one.row] -= 1
+                since, said = -1, one.text
+            elif since < 0 and one.text != said:
+                since = one.row
+        if since >= 0:
+            edge[since] += 1
+    return np.asarray(np.cumsum(edge)[:count] > 0)
 
 
 def _text(comment: bytes) -> str:

@@ -14,6 +14,7 @@ from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses, rotation_from_abc
 from postproc.base.units import DEG, MM
+from postproc.languages.core.comments_in_force import CONTRADICTED
 from postproc.languages.dialect import PLAIN, Program, ReadingSettings
 from postproc.languages.gcode import offsets
 from postproc.languages.gcode.block_arcs import arcs_of_blocks, given_by_point
@@ -131,9 +132,10 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         where = int(lines.line[np.argmax(others)])
         message = f"an axis that is none of X, Y, Z, E1 to E6 and the rotary ones moves (line {where})"
         collector.refuse(np.ones(len(rows), np.bool_), "GCO026", message)
+    said = remarks(document, source, rows, execution, given.modal.flow)
+    collector.refuse(said.varying, "GCO006", CONTRADICTED)
     refused = collector.done(document, line, start, lines.first[rows])
     frame_of_base, frame_of_tool, cell_frames = references(base, tool[rows], line, offset.stated)
-    said = remarks(document, source, rows, execution)
     state = {name: found.take_column(name) for name in STATE}
     inverse_time = state["feed_mode"] == Feed.INVERSE_TIME
     drilled = found.take_column("drills")

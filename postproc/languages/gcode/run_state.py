@@ -87,9 +87,10 @@ class RunState:
         self.called: list[int] = []
         self.entered: list[int] = []
         self.jumped: list[int] = []  # steps that are reached by a jump, past what is written before them
-        self.reached: list[
-            tuple[int, int]
-        ] = []  # steps before which the run comes to a block that is none of it
+        # first and last step of what may be passed or not
+        self.doubtful: list[tuple[int, int]] = []
+        # steps before which the run comes to a block that is none of it
+        self.reached: list[tuple[int, int]] = []
         self.unknown: dict[str, int] = {}
         self.integers: set[str] = set()  # names that hold whole numbers only
         self.frames: list[CallFrame] = []
