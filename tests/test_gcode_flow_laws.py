@@ -241,6 +241,7 @@ BY_HAND = [
     ("linuxcnc", "#<_d>=2\nO1 SUB\n#<_d>=4\nO1 ENDSUB\nO1 CALL\nG1 X#<_d>\n", ["4 0 0"]),
     ("linuxcnc", "#30=2\n#31=2\nO1 SUB\n#30=4\n#31=4\nO1 ENDSUB\nO1 CALL\nG1 X#30 Y#31\n", ["2 4 0"]),
     ("fanuc", "#33=2.\n#100=2.\nG65 P2\nG1 X#33 Y#100\nM30\nO2\n#33=4.\n#100=4.\nM99\n", ["2 4 0"]),
+    ("fanuc", "#34=2.\nG65 P2\nG1 X#34\nM30\nO2\n#34=4.\nM99\n", ["4 0 0"]),
     ("fanuc", "#1=4.\nM98 P2\nG1 X#1\nM30\nO2\n#1=9.\nM99\n", ["9 0 0"]),
     ("sinumerik", "R1=1\nL5\nG1 X=R1\nM30\n%_N_L5_SPF\nR1=2\nM17\n", ["2 0 0"]),
     ("sinumerik", "DEF REAL _A=1\nL5\nG1 X=_A\nM30\n%_N_L5_SPF\nDEF REAL _A=4\nG1 Y=_A\nM17\n", ["0 4 0", "1 4 0"]),
@@ -250,6 +251,9 @@ BY_HAND = [
         ("fanuc", f"G65 P2 {letter}5.\nM30\nO2\nG1 X#{number}\nM99\n", ["5 0 0"])
         for letter, number in zip("DEFHIJKMQRSTUVWXYZ", (7, 8, 9, 11, 4, 5, 6, 13, *range(17, 27)), strict=True)
     ),
+    # modes that are brought back are not followed; other codes leave them alone
+    ("linuxcnc", "G1 X1\nM70\nG91\nM72\nX2 Y2 Z2\n", ["1 0 0", "?*"]),
+    ("linuxcnc", "G1 X1\nM70\nG91\nM8\nX2 Y2 Z2\nG90 X3 Y3 Z3\n", ["1 0 0", "3 2 2", "3 3 3"]),
     # parts that are repeated
     ("sinumerik", "A1:\nG1 X=IC(1)\nENDLABEL:\nG1 X5\nREPEAT A1 P=2\nG1 Y1\n",
      ["1 0 0*", "5 0 0", "6 0 0*", "7 0 0*", "7 1 0"]),

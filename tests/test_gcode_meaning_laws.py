@@ -160,3 +160,11 @@ def test_arguments_of_a_macro_turn_no_axis() -> None:
     """A, B and C of G65 are variables of the macro."""
     assert run("fanuc", "G65 P2 A5. B6. C7.\nG1 Z1.\nM30\nO2\nG1 X#1 Y#2\nM99\n") == ["5 6 0", "5 6 1"]
     assert run("fanuc", "G65 P2 A5.\nG1 A5. Z1.\nM30\nO2\nG1 X#1\nM99\n") == ["5 0 0*", "5 0 1*"]
+
+
+def test_a_work_offset_behind_other_settings_is_stated() -> None:
+    for before in ("G10 L1 P1 Z5.", "G10 L10 P1 R2.", "G10 L2 P2 X1.", "G10 L1 P1 Z5.\nG10 L11 P1 Z5."):
+        path = read("fanuc", f"{before}\nG10 L2 P1 X10. Y20. Z30.\nG0 X1. Y1. Z1.\nG1 X5.\n").toolpath
+        pose = path.frames[path.base[-1]].pose
+        assert pose is not None
+        np.testing.assert_allclose(pose.position * 1e3, [10, 20, 30])
