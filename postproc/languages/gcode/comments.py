@@ -50,7 +50,9 @@ def remarks(
         comments, rows = comments[which], np.searchsorted(steps, at)
     marker = _marker(raw, source.comments)
     spans, lines = comments[:, :2], comments[:, 2]
-    alone = ~np.isin(lines, source.blocks.line[source.blocks.wordy]) if len(lines) else lines
+    alone = np.ones(0, np.bool_)
+    if len(lines):
+        alone = ~np.isin(lines, source.blocks.line[source.blocks.wordy])
     speaking, others, doubted = [], [], []
     for (start, stop), number, row, own, doubt in zip(
         spans.tolist(),
@@ -85,7 +87,7 @@ def _doubted(at: Ints, alone: Bools, execution: Execution, flow: ExecutionFlow) 
     else:
         inside = np.append(flow.reason == FlowReason.FLOW, False)
         before = (inside & np.append(False, inside[:-1])) | np.append(flow.entered, False)
-    return np.asarray(np.where(alone.astype(bool), before[at], uncertain[at]))
+    return np.asarray(np.where(alone, before[at], uncertain[at]))
 
 
 def _varying(speaking: list[Annotation], doubted: list[bool], count: int) -> Bools:
@@ -132,7 +134,7 @@ def _passed(comments: Ints, lines: Ints, order: Ints, execution: Execution) -> t
     alone = np.ones(len(comments), np.bool_)
     alone[inside] = lines[block[inside]] != comments[inside, 2]
     jumped = np.zeros(len(order) + 1, np.bool_)
-    jumped[execution.jumped] = True
+    jumped[execution.arrivals] = True
     by_block = np.argsort(order, kind="stable")
     first, behind = (np.searchsorted(order[by_block], block, side=side) for side in ("left", "right"))
     often = behind - first

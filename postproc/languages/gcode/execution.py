@@ -59,7 +59,7 @@ class Execution:
     (E,): the block of the text of each; None where that is the order of the text.  followed: loops, branches and
     calls are; reason (E,) FlowReason where they are.  tape (E,): the block belongs to the program.  called (E,):
     the step calls a subprogram that is followed.  entered (E,): a jump leads to the block.  repeated (E,): the
-    block runs in other steps as well.  jumped (J,): steps that a jump leads to, past what is written before their
+    block runs in other steps as well.  arrivals (J,): steps that a jump leads to, past what is written before their
     block; reached (R, 2): steps before which the run comes to a block that does not run then, and that block.
     perhaps (P, 2): first and last step of what is written before their blocks and may be passed or not.
     folded: the words whose values are put in.  unknown: names whose value was
@@ -78,7 +78,7 @@ class Execution:
     folded: FoldedWords
     unknown: Mapping[str, int]
     missing: frozenset[str] = frozenset()
-    jumped: Ints = field(default_factory=lambda: np.empty(0, np.int64))
+    arrivals: Ints = field(default_factory=lambda: np.empty(0, np.int64))
     reached: Ints = field(default_factory=lambda: np.empty((0, 2), np.int64))
     perhaps: Ints = field(default_factory=lambda: np.empty((0, 2), np.int64))
 
