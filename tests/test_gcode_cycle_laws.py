@@ -148,7 +148,7 @@ def test_what_moves_nothing_changes_no_hole_and_no_level(control: str, block: st
 ELSEWHERE = [
     "G28 Z0.", "G28", "G91 G28 Z0.\nG90", "G30 Z0.", "G53 G0 Z0.", "G38.2 Z-5.", "G31 Z-5.", "G65 P9000", "M98 P9000",
     "G10 L2 P1 Z5.", "G55", "G43 H1", "G43.1 Z2.", "G1 X5. X6.", "/G1 Z9.", "/G91", "/G55", "/G43 H1", "FOO BAR",
-    "G1 Z#500", "G68 R5.", "G51 P2.", "G16", "#5223=4",
+    "G1 Z#500", "G68 R5.", "G51 P2.", "G16", "#5223=4", "G72 X1.",
 ]  # fmt: skip
 """Behind these the tool is not where the last Z said, or may not be."""
 
