@@ -272,12 +272,12 @@ def test_angles_change_where_others_are_nearer(words: str, share: float) -> None
 
 
 @pytest.mark.parametrize("code", ["G52", "G92"])
-@pytest.mark.parametrize(("unit", "whole"), [("G21", "X1000 Y-2500"), ("G20", "X10000 Y-25000")])
+@pytest.mark.parametrize(("unit", "whole"), [("G21", "X1000 Y-2500 Z3000"), ("G20", "X10000 Y-25000 Z30000")])
 def test_shifts_count_increments_too(code: str, unit: str, whole: str) -> None:
     """A control that takes X1000 for a millimetre does so wherever it says a length."""
     micro = ReadingSettings(orientation=DOWN.orientation, options={"integer_words": "um"})
     ends = []
-    for said in (whole, "X1. Y-2.5"):
+    for said in (whole, "X1. Y-2.5 Z3."):
         text = f"{unit} G90 G17 G54 T1\nG0 X0. Y0. Z0.\n{code} {said}\nG1 X4. Y5. Z6. F100\n"
         ends.append(read(NAMES["fanuc"], text, micro).toolpath.position)
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-12)

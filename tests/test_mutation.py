@@ -7,7 +7,7 @@ pytest.importorskip("cosmic_ray", reason="pip install .[mutation]")
 from mutation import judging, stream
 from mutation.command import changed, judge, row, wilson
 from mutation.mutants import mutants, sample
-from mutation.probes import NOTE, with_probes
+from mutation.probes import NOTE, Probes, with_probes
 
 SOURCE = '''\
 """A document of 3 words."""
@@ -103,6 +103,48 @@ def test_a_probe_is_before_the_statement_of_its_mutant(tree):
     assert run["grown"].__doc__ == "Adds 7 to nothing."
     assert run["grown"](run["Thing"](3), 2.0) == 5.0
     assert {numbered[number].line for number in reached} == lines
+
+
+def test_what_a_table_says_may_be_met_by_every_test(tree):
+    """In a file without functions no probe can tell who reads it."""
+    (tree / "table.py").write_text("SIZES = {1: 2}\n")
+    of_table = mutants(tree, "table.py")
+    probes = Probes(tree, [*mutants(tree, "thing.py"), *of_table])
+    count = len(mutants(tree, "thing.py"))
+    assert probes.of_tables == set(range(count, count + len(of_table)))
+    assert probes.at_import["table"] == probes.of_tables
+    lines = {
+        mutant.line
+        for number, mutant in enumerate(mutants(tree, "thing.py"))
+        if number in probes.at_import["thing"]
+    }
+    assert lines == {4, 9, 12}
+
+
+def test_a_test_is_near_what_its_helpers_import(tree):
+    tests = tree / "tests"
+    for name, text in (
+        ("near", "from package.room import thing"),
+        ("around", "import package"),
+        ("far", "import other"),
+        ("helped", "from helper.part import thing"),
+        ("helped_twice", "import helpers"),
+    ):
+        (tests / f"test_{name}.py").write_text(text + "\n")
+    (tests / "helper").mkdir()
+    (tests / "helper" / "part.py").write_text("import helpers\nfrom package.room.inner import thing\n")
+    (tests / "helpers.py").write_text("import helper.part\n")
+
+    def near(*rooms: str) -> set[str]:
+        return {
+            path.stem.removeprefix("test_")
+            for path in tests.glob("test_*.py")
+            if stream.is_near(tree, f"tests/{path.name}", rooms)
+        }
+
+    assert near("package/room") == {"near", "helped", "helped_twice"}
+    assert near("package/room/inner") == {"near", "helped", "helped_twice"}
+    assert near("other/room") == set()
 
 
 CACHED = """\

@@ -1,8 +1,10 @@
 """Who reaches a mutant, and the mutant in its place, without a second import.
 
 A module with mutants is imported with calls in it that note which of them a run comes by: before the statement of each
-mutant inside of a function; at the start of every function of the file for one that runs at import.  In a process that
-is forked later the function that holds a mutant gets the code of the mutated file: what was imported stays.
+mutant inside of a function; at the start of every function of the file for one that runs at import.  Every test may
+come by a file without functions, a table, and the tests of a file by what runs at import in the modules that it
+imports.  In a process that is forked later the function that holds a mutant gets the code of the mutated file: what was
+imported stays.
 """
 
 from __future__ import annotations
@@ -128,6 +130,21 @@ class Probes:
         for number, mutant in enumerate(mutants):
             self.files.setdefault(str(tree / mutant.path), {})[number] = mutant
         self.reached = Reached()
+        self.of_tables: set[int] = set()
+        """Mutants of files without functions."""
+        self.at_import: dict[str, set[int]] = {}
+        """Name of a module -> its mutants that run at import alone."""
+        for path, some in self.files.items():
+            source = Path(path).read_text(encoding="utf-8")
+            parsed, lines = ast.parse(source), source.splitlines()
+            if not outer_functions(parsed):
+                self.of_tables |= set(some)
+            name = ".".join(Path(path).relative_to(tree).with_suffix("").parts)
+            self.at_import[name] = {
+                number
+                for number, mutant in some.items()
+                if holder(parsed, mutant.line, len(lines[mutant.line - 1][: mutant.column].encode())) is None
+            }
 
     def install(self) -> None:
         setattr(builtins, NOTE, self.reached)

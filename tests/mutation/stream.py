@@ -5,7 +5,7 @@ function that holds the mutant has the mutated code (``probes.swap_of``), and in
 are run, the quickest and those that killed before first, up to the first that fails.  Fixtures are prepared anew there,
 and what functions of the tree have cached is forgotten.
 
-What is left to a judgement of its own (``judging``): mutants of what runs at import.
+What is left to a judgement of its own (``judging``): mutants of what runs at import alone, functions too.
 """
 
 from __future__ import annotations
@@ -39,11 +39,13 @@ LIVES, FALLS = 0, 1
 
 @dataclass
 class Stream:
-    """``seconds``: what each test takes that passes; ``reached``: number of a mutant -> tests that come by it;
+    """``seconds``: what each test takes that passes; ``reached``: number of a mutant -> tests that come by it; ``ran``:
+    those that tests come by while they run, and not only what they import;
     ``verdicts``: number of a mutant -> (verdict, test at which it fell); ``ended``: all that can be done here is."""
 
     seconds: dict[str, float] = field(default_factory=dict)
     reached: dict[int, list[str]] = field(default_factory=dict)
+    ran: set[int] = field(default_factory=set)
     verdicts: dict[int, tuple[str, str]] = field(default_factory=dict)
     ended: bool = False
 
@@ -55,6 +57,7 @@ class Stream:
             self.verdicts[line["mutant"]] = line["verdict"], line["test"]
             return
         self.seconds[line["test"]] = line["seconds"]
+        self.ran |= set(line["ran"])
         for number in line["reached"]:
             self.reached.setdefault(number, []).append(line["test"])
 
@@ -97,6 +100,8 @@ class _Runner:
         self.collected: dict[str, set[int]] = {}
         """File of tests -> what its import comes by."""
         self.failed: set[str] = set()
+        self.imported: dict[str, set[int]] = {}
+        """File of tests -> mutants that run at import, of the modules that it imports."""
 
     def keep(self, line: dict[str, Any]) -> None:
         self.stream.add(line)
@@ -145,11 +150,25 @@ class _Runner:
         seconds = time.process_time() - start
         self.probes.reached.turn(before)
         if item.nodeid in self.failed:
-            own = set()
+            own, ran = set(), []
         else:
-            own |= self.prepared(item) | self.collected.get(item.nodeid.split("::")[0], set())
-        self.keep({"test": item.nodeid, "seconds": seconds, "reached": sorted(own)})
+            ran = sorted(own | self.prepared(item))
+            file = item.nodeid.split("::")[0]
+            own |= (
+                self.prepared(item)
+                | self.collected.get(file, set())
+                | self.probes.of_tables
+                | self.read(file)
+            )
+        self.keep({"test": item.nodeid, "seconds": seconds, "reached": sorted(own), "ran": ran})
         return result
+
+    def read(self, file: str) -> set[int]:
+        """Mutants that run at import, of the modules that a file of tests imports."""
+        if file not in self.imported:
+            names = judging.imported(self.tree / file)
+            self.imported[file] = set().union(*(self.probes.at_import.get(name, set()) for name in names))
+        return self.imported[file]
 
     # -- the runs --------------------------------------------------------------------------------------------------
 
@@ -171,7 +190,7 @@ class _Runner:
         mutant, text = self.mutants[number]
         chosen = self.stream.choice(number, self.budget)
         swap = swap_of(self.tree, mutant, text, (self.tree / mutant.path).read_text(encoding="utf-8"))
-        if not chosen or swap is None:
+        if not chosen or swap is None or number not in self.stream.ran:
             return
         note = self.log.with_suffix(".note")
         note.write_text("")
@@ -209,9 +228,26 @@ def _run(items: Sequence[Any], seconds: dict[str, float], note: Path) -> int:
 
 
 def is_near(tree: Path, test: str, packages: Sequence[str]) -> bool:
-    """Whether a file of tests imports what is in the packages."""
+    """Whether a file of tests imports what is in the packages, itself or through modules of the tests, or the package
+    around them, which leads to it."""
     names = tuple(package.replace("/", ".") for package in packages)
-    return any(one.startswith(names) for one in judging.imported(tree / test))
+    around = {name.rpartition(".")[0] for name in names if name.count(".") > 1}
+    open_, seen = [tree / test], set()
+    while open_:
+        found = judging.imported(open_.pop())
+        if any(one.startswith(names) or one in around for one in found):
+            return True
+        paths = {_of_tests(tree, one) for one in found} - {None} - seen
+        seen |= paths
+        open_ += [path for path in paths if path is not None]
+    return False
+
+
+def _of_tests(tree: Path, module: str) -> Path | None:
+    """The file of a module of the tests, None for another."""
+    path = (tree / "tests").joinpath(*module.split("."))
+    files = (path.with_suffix(".py"), path / "__init__.py")
+    return next((one for one in files if one.is_file()), None)
 
 
 def run(

@@ -58,7 +58,8 @@ _COMMON = modal_codes(
         (Group.ONCE, Once.HOME, (28, 29, 30)),
         (Group.ONCE, Once.OTHER, (22,)),
         (Group.ONCE, Once.STORE, (28.1, 30.1)),
-        (Group.ONCE, Once.PROBE, (31, 37, 38.2, 38.3, 38.4, 38.5)),
+        (Group.ONCE, Once.PROBE, (31, 37)),
+        (Group.MOTION, Move.OTHER, (38.2, 38.3, 38.4, 38.5)),
         (Group.ONCE, Once.LOCAL, (52,)),
         (Group.ONCE, Once.MACHINE, (53,)),
         (Group.ONCE, Once.SHIFT, (92,)),
@@ -96,8 +97,10 @@ _ARGUMENTS = {
         (ModalCode(Group.ONCE, Once.OTHER),),
     ),
     500: (ModalCode(Group.ONCE, Once.SHIFT),),
+    **dict.fromkeys((382, 383, 384, 385), (ModalCode(Group.ONCE, Once.PROBE),)),
 }
-"""Codes whose axis words are no targets; G50 X Z of lathes sets coordinates as G92 does."""
+"""Codes whose axis words are no targets; G50 X Z of lathes sets coordinates as G92 does.  What follows G38.2 without a
+code is a probing move too."""
 
 _DRILLS = frozenset((73, 74, 81, 82, 83, 84, 85, 86, 88, 89))
 """Without G76 (a thread, or a hole that is left beside its axis) and G87 (from below)."""

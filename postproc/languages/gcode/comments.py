@@ -12,6 +12,8 @@ from postproc.base.arrays import Bools, Ints
 from postproc.base.document import Document, Span
 from postproc.languages.core.comments_in_force import SPEAKS
 from postproc.languages.dialect import MARK
+from postproc.languages.gcode.execution import Execution
+from postproc.languages.gcode.execution_flow import ExecutionFlow, FlowReason
 from postproc.languages.gcode.source import Source
 from postproc.toolpath import Annotation
 from postproc.toolpath.meant_comments import meant_to_speak
@@ -30,34 +32,82 @@ class Remarks(NamedTuple):
     comments: tuple[Annotation, ...]
     marker: Span | None
     marker_at: Span
+    varying: Bools
+    """(N,) motions at which it differs with the path of the program which FORCE or COMPENSATE comment is in force."""
 
 
 def remarks(
-    document: Document, source: Source, steps: Ints, in_text_order: bool, in_other_file: Bools
+    document: Document, source: Source, steps: Ints, execution: Execution, flow: ExecutionFlow
 ) -> Remarks:
-    """``steps`` (N,): blocks of ``source`` that are the motions; in_other_file (B,): those of other files."""
+    """``steps`` (N,): blocks of ``source`` that are the motions."""
     raw, run = document.raw, source.blocks.line
     comments = source.comments
-    if in_text_order:
+    if execution.order is None:
+        at = np.searchsorted(run, comments[:, 2])
         rows = np.searchsorted(run[steps], comments[:, 2])
     else:
-        comments, rows = _passed(comments, run, steps, in_other_file)
+        which, at = _passed(comments, execution.text.blocks.line, execution.order, execution)
+        comments, rows = comments[which], np.searchsorted(steps, at)
     marker = _marker(raw, source.comments)
     spans, lines = comments[:, :2], comments[:, 2]
-    alone = ~np.isin(lines, source.blocks.line[source.blocks.wordy]) if len(lines) else lines
-    speaking, others = [], []
-    for (start, stop), number, row, own in zip(
-        spans.tolist(), lines.tolist(), rows.tolist(), alone.tolist(), strict=True
+    alone = np.ones(0, np.bool_)
+    if len(lines):
+        alone = ~np.isin(lines, source.blocks.line[source.blocks.wordy])
+    speaking, others, doubted = [], [], []
+    for (start, stop), number, row, own, doubt in zip(
+        spans.tolist(),
+        lines.tolist(),
+        rows.tolist(),
+        alone.tolist(),
+        _doubted(at, alone, execution, flow).tolist(),
+        strict=True,
     ):
         said = _text(raw[start:stop])
         if marker is not None and start == marker.start:
             continue
         if SPEAKS.match(said):
             speaking.append(Annotation(row, said, number))
+            doubted.append(doubt)
         elif said and (own or meant_to_speak(said)):
             others.append(Annotation(row, said, number))
-    at = head(raw)
-    return Remarks(tuple(speaking), tuple(others), marker, Span(0, at, at))
+    first = head(raw)
+    varying = _varying(speaking, doubted, len(steps))
+    return Remarks(tuple(speaking), tuple(others), marker, Span(0, first, first), varying)
+
+
+def _doubted(at: Ints, alone: Bools, execution: Execution, flow: ExecutionFlow) -> Bools:
+    """(C,) comments, at steps ``at`` (C,), that the run may pass or not; alone (C,): no words are in their line."""
+    n = len(flow.reason)
+    uncertain = np.append(np.isin(flow.reason, (FlowReason.FLOW, FlowReason.DELETED)), False)
+    if execution.followed:
+        edge = np.zeros(n + 2, np.int32)
+        np.add.at(edge, execution.perhaps[:, 0], 1)
+        np.add.at(edge, execution.perhaps[:, 1] + 1, -1)
+        before = np.cumsum(edge)[: n + 1] > 0
+    else:
+        inside = np.append(flow.reason == FlowReason.FLOW, False)
+        before = (inside & np.append(False, inside[:-1])) | np.append(flow.entered, False)
+    return np.asarray(np.where(alone, before[at], uncertain[at]))
+
+
+def _varying(speaking: list[Annotation], doubted: list[bool], count: int) -> Bools:
+    """(N,) see ``Remarks.varying``: behind a comment that may be passed or not, up to one that is."""
+    edge = np.zeros(count + 1, np.int32)
+    for word in ("FORCE", "COMPENSATE"):
+        since, said = -1, ""
+        for one, doubt in zip(speaking, doubted, strict=True):
+            if not one.text.upper().startswith(word):
+                continue
+            if not doubt:
+                if since >= 0:
+                    edge[since] += 1
+                    edge[one.row] -= 1
+                since, said = -1, one.text
+            elif since < 0 and one.text != said:
+                since = one.row
+        if since >= 0:
+            edge[since] += 1
+    return np.asarray(np.cumsum(edge)[:count] > 0)
 
 
 def _text(comment: bytes) -> str:
@@ -73,20 +123,34 @@ def _marker(raw: bytes, comments: Ints) -> Span | None:
     return next((Span(0, *span) for span in spans if _text(raw[slice(*span)]).startswith(MARK)), None)
 
 
-def _passed(comments: Ints, run: Ints, steps: Ints, in_other_file: Bools) -> tuple[Ints, Ints]:
-    """The comments in the order in which the run passes them, each as often as it does; the motions after them."""
-    if not len(comments) or not len(run):
-        return comments, comments[:, 2]
-    lines = comments[:, 2]
-    cuts = np.flatnonzero((np.diff(run) <= 0) & ~in_other_file[1:]) + 1
-    which, at = [], []
-    for start, stop in zip(np.append(0, cuts).tolist(), np.append(cuts, len(run)).tolist(), strict=True):
-        low, high = np.searchsorted(lines, [run[start], run[stop - 1] + 1]).tolist()
-        if start == 0 and run[0] == run.min():
-            low = 0  # those at the head of the file
-        which.append(np.arange(low, high))
-        at.append(start + np.searchsorted(run[start:stop], lines[low:high]))
-    return comments[np.concatenate(which)], np.searchsorted(steps, np.concatenate(at))
+def _passed(comments: Ints, lines: Ints, order: Ints, execution: Execution) -> tuple[Ints, Ints]:
+    """(K,) the comments in the order in which the run passes them, each as often as it does, and (K,) the steps before
+    which it does; comments (C, 3); lines (T,): of the blocks as they are written, of which ``order`` (E,) runs one a
+    step.
+
+    A comment is passed before the block of its line, or before the next one, where that is not reached by a jump."""
+    block = np.searchsorted(lines, comments[:, 2])
+    inside = np.flatnonzero(block < len(lines))
+    alone = np.ones(len(comments), np.bool_)
+    alone[inside] = lines[block[inside]] != comments[inside, 2]
+    jumped = np.zeros(len(order) + 1, np.bool_)
+    jumped[execution.arrivals] = True
+    by_block = np.argsort(order, kind="stable")
+    first, behind = (np.searchsorted(order[by_block], block, side=side) for side in ("left", "right"))
+    often = behind - first
+    which = np.repeat(np.arange(len(comments)), often)
+    at = by_block[np.arange(len(which)) + np.repeat(first - np.cumsum(often) + often, often)]
+    passes = ~(alone[which] & jumped[at])
+    found = [np.stack([which[passes], at[passes]], axis=1)]
+    before: dict[int, list[int]] = {}
+    for comment in np.flatnonzero(alone).tolist():
+        before.setdefault(int(block[comment]), []).append(comment)
+    for step, reached in execution.reached.tolist():
+        if reached in before:
+            found.append(np.array([[comment, step] for comment in before[reached]]))
+    passed = np.concatenate(found)
+    passed = passed[np.lexsort((passed[:, 0], passed[:, 1]))]
+    return passed[:, 0], passed[:, 1]
 
 
 def head(raw: bytes) -> int:

@@ -104,11 +104,11 @@ def cycle_ends(words: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
         words.motion[:, None] & (hows >= 0) & ~placed & ~(cycle[:, None] & (axis[:, None] == np.arange(3)))
     )
     unplaced = np.maximum.accumulate(np.where(moved, number, -1), axis=0)
-    uncertain = np.cumsum(anywhere)
+    uncertain, units = np.cumsum(anywhere), words.modal.force[Group.UNITS]
     lost = np.cumsum(leaves_unknown(words, lengths) | anywhere)
-    # A cycle that does not state R, G98, G99 and the frame ends as the one before it.
+    # A cycle that does not state R, G98, G99, the frame and the unit ends as the one before it.
     says = has_plane[rows] | ~absolute[rows] | (words.move[rows - 1] != Move.CYCLE)
-    for state in (axis, frame, back, uncertain):
+    for state in (axis, frame, back, uncertain, units):
         says[1:] |= state[rows[1:]] != state[rows[:-1]]
     says[0] = True
     heads = np.flatnonzero(says)
@@ -124,8 +124,8 @@ def cycle_ends(words: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
             at, origin = max(at, drill), _level_from(words, row, cycle, source)
             same = at > unplaced[row, axis[row]] and frame[at] == frame[row] and lost[at] == lost[row]
             at_r, before = np.nan, there if same else np.nan
-        elif frame[row] != frame[last] or axis[row] != axis[last] or uncertain[row] != uncertain[last]:
-            # LinuxCNC goes back to the number of the other axis
+        elif any(state[row] != state[last] for state in (frame, axis, uncertain, units)):
+            # LinuxCNC goes back to the number of the other axis, and in the other unit
             at_r, before = np.nan, np.nan
         last = drilled[axis[row]] = tail
         if has_plane[row]:  # one that is computed is not known

@@ -8,7 +8,7 @@ place and is marked: what it assigns is unknown after it.  A flow that cannot be
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -61,7 +61,10 @@ class Execution:
     (E,): the block of the text of each; None where that is the order of the text.  followed: loops, branches and
     calls are; reason (E,) FlowReason where they are.  tape (E,): the block belongs to the program.  called (E,):
     the step calls a subprogram that is followed.  entered (E,): a jump leads to the block.  repeated (E,): the
-    block runs in other steps as well.  folded: the words whose values are put in.  unknown: names whose value was
+    block runs in other steps as well.  arrivals (J,): steps that a jump leads to, past what is written before their
+    block; reached (R, 2): steps before which the run comes to a block that does not run then, and that block.
+    perhaps (P, 2): first and last step of what is written before their blocks and may be passed or not.
+    folded: the words whose values are put in.  unknown: names whose value was
     wanted and is not known, and the block where it was first.  missing: names of programs that are called and are not
     in the text."""
 
@@ -77,6 +80,9 @@ class Execution:
     folded: FoldedWords
     unknown: Mapping[str, int]
     missing: frozenset[str] = frozenset()
+    arrivals: Ints = field(default_factory=lambda: np.empty(0, np.int64))
+    reached: Ints = field(default_factory=lambda: np.empty((0, 2), np.int64))
+    perhaps: Ints = field(default_factory=lambda: np.empty((0, 2), np.int64))
 
 
 def execute(
@@ -185,7 +191,7 @@ def _result(run: RunFlow, stop: int, followed: bool, own: int | None = None) -> 
     called[run.called], entered[run.entered] = True, True
     if not same:
         entered[:-1] |= np.diff(order, prepend=-1) != 1
-    held = np.array(sorted(step for step, holds in run.taken.items() if holds), np.int64)
+    held = np.array(run.held, np.int64)
     source = run.source if same and not len(held) else run.source.in_order(order, held)
     source = source.with_values(folded.step, folded.key, folded.nth, folded.value, folded.how)
     return Execution(
@@ -201,4 +207,7 @@ def _result(run: RunFlow, stop: int, followed: bool, own: int | None = None) -> 
         folded,
         run.unknown,
         frozenset(run.missing),
+        np.array(run.jumped, np.int64),
+        np.array(run.reached, np.int64).reshape(-1, 2),
+        np.array(run.doubtful, np.int64).reshape(-1, 2),
     )

@@ -13,7 +13,7 @@ from postproc.base.arrays import Bools, Ints
 from postproc.languages.gcode.source import Source
 from postproc.languages.gcode.words import key
 
-_GOTO = re.compile(r"(?:GOTO[BFC]?|REPEATB?)\s*(N?\d+|[A-Z_]\w+)?(?:\s+([A-Z_]\w+))?", re.I)
+_JUMP = re.compile(r"GOTO[BFC]?\s*(N?\d+|[A-Z_]\w+)?|REPEATB?\s*(N?\d+|[A-Z_]\w+)?(?:\s+([A-Z_]\w+))?", re.I)
 _ZEROS = re.compile(r"^N?0*(?=\d)")
 SAVES, RESTORES, SAVES_FOR_A_CALL = 70, 72, 73
 """Of LinuxCNC: M72 brings back modes that M70 has saved; M73 has the end of its subprogram do so."""
@@ -97,7 +97,7 @@ def uncertain_stretches(source: Source, entered: Bools | None = None) -> list[tu
     n = len(source.blocks)
     found: list[tuple[int, int]] = []
     stack: list[tuple[int, str]] = []
-    labels: dict[str, int] | None = None
+    labels: dict[str, list[int]] | None = None
     for note in source.notes:
         if note.kind == "open" or (
             note.kind == "while" and not any(label == note.text.split()[0] for _, label in stack[-1:])
@@ -109,15 +109,17 @@ def uncertain_stretches(source: Source, entered: Bools | None = None) -> list[tu
                 if not stack:
                     found.append((start, note.block + 1))
         elif note.kind == "jump":
-            goto = _GOTO.search(note.text)
-            if goto is None:
+            jumps = _JUMP.findall(note.text)  # several of a CASE
+            if not jumps:
                 continue
             labels = _labels(source) if labels is None else labels
-            ends = [labels.get(label_name(name)) for name in goto.groups() if name]
-            if not ends or None in ends:
+            ends = [
+                labels.get(label_name(name)) for names in jumps for name in [*filter(None, names)] or [""]
+            ]
+            if None in ends:
                 found.append((0, n))
             else:
-                at = [note.block, *(end for end in ends if end is not None)]
+                at = [note.block, *(end for some in ends if some is not None for end in some)]
                 found.append((min(at), max([note.block + 1, *at])))
                 if entered is not None:
                     entered[at[1:]] = True
@@ -126,13 +128,18 @@ def uncertain_stretches(source: Source, entered: Bools | None = None) -> list[tu
     return found
 
 
-def _labels(source: Source) -> dict[str, int]:
+def _labels(source: Source) -> dict[str, list[int]]:
     """Blocks by the N-number or the label that they start with."""
     numbers = source.column(key("N"))
     known = np.isfinite(numbers.value)
     names = [f"{value:.0f}" for value in numbers.value[known].tolist()]
-    labels = dict(zip(names, numbers.block[known].tolist(), strict=True))
-    return labels | {label_name(note.text): note.block for note in source.notes if note.kind == "label"}
+    labels: dict[str, list[int]] = {}
+    for name, block in zip(names, numbers.block[known].tolist(), strict=True):
+        labels.setdefault(name, []).append(block)
+    for note in source.notes:
+        if note.kind == "label":
+            labels.setdefault(label_name(note.text), []).append(note.block)
+    return labels
 
 
 def label_name(name: str) -> str:

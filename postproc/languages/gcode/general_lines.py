@@ -24,8 +24,9 @@ _TOKEN = re.compile(
 )
 _HEAD = re.compile(rb"[ \t]*(?:(?P<tape>%)|(?P<program>:[ \t]*\d+|<[^>]*>))")
 _FLOW = re.compile(
-    rb"[ \t]*(?:N[ \t]*\d+[ \t]*)?(O[ \t]*(?:\d+|<[^>]*>|#[^ \t]*|\[[^\]]*\]))[ \t]*([A-Za-z]+)", re.I
-)
+    rb"[ \t]*+(?P<slash>/[ \t]*+)?(?:N[ \t]*\d+[ \t]*)?(?P<label>O[ \t]*(?:\d+|<[^>]*>|#[^ \t]*|\[[^\]]*\]))[ \t]*"
+    rb"(?P<word>[A-Za-z]+)", re.I
+)  # fmt: skip
 _TEXT = re.compile(rb"[ \t]*(?:N[ \t]*\d+[ \t]*)?(M[ \t]*11[78])(?!\d)", re.I)
 _TARGET = re.compile(rb"#[ \t]*+(\d++|<[^>]*+>|(?=[#\[]))")
 _ASSIGNED = re.compile(rb"[ \t]*+=[ \t]*+")
@@ -75,12 +76,12 @@ def line(text: bytes) -> LexedLine:
         return LexedLine(words, notes, deleted)
     flow = _FLOW.match(text, place)
     if flow is not None:
-        label, word = flow[1].upper().translate(None, b" \t"), flow[2].upper()
+        label, word = flow["label"].upper().translate(None, b" \t"), flow["word"].upper()
         note(
             _FLOW_WORDS.get(word, "unknown"),
             (label + b" " + word + b" " + text[flow.end() :].strip()).strip(),
         )
-        return LexedLine(words, notes, deleted)
+        return LexedLine(words, notes, flow["slash"] is not None)
     while place < len(text):
         found = _TOKEN.match(text, place)
         if found is None and _speaks(words):

@@ -15,6 +15,7 @@ from postproc.base.findings import Finding
 from postproc.base.geometry import Poses, rotation_from_abc
 from postproc.base.memory import without_garbage_collection
 from postproc.base.units import DEG, MM
+from postproc.languages.core.comments_in_force import CONTRADICTED
 from postproc.languages.dialect import PLAIN, Program, ReadingSettings
 from postproc.languages.gcode import offsets
 from postproc.languages.gcode.block_arcs import arcs_of_blocks, given_by_point
@@ -143,9 +144,10 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         help_ = f"state in the cell what they carry: {stated} where it moves neither robot nor part; or kind: track"
         help_ = help_ if first else ""
         collector.refuse(np.ones(len(rows), np.bool_), "GCO026", message, help_)
+    said = remarks(document, source, rows, execution, given.modal.flow)
+    collector.refuse(said.varying, "GCO006", CONTRADICTED)
     refused = collector.done(document, line, start, lines.first[rows])
     frame_of_base, frame_of_tool, cell_frames = references(base, tool[rows], line, offset.stated)
-    said = remarks(document, source, rows, execution.order is None, foreign)
     state = {name: found.take_column(name) for name in STATE}
     inverse_time = state["feed_mode"] == Feed.INVERSE_TIME
     drilled = found.take_column("drills")

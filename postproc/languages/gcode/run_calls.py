@@ -47,8 +47,15 @@ class RunCalls(RunState):
         self.called.append(step)
         if count < 1:
             return block + 1
-        self.frames.append(CallFrame(block + 1, start, stop, count, block, outer))
-        return start
+        self.frames.append(CallFrame(block + 1, start, stop, count, block, outer, jumps=verb == "local"))
+        return self.enter_part()
+
+    def enter_part(self) -> int:
+        """The start of what is called or repeated."""
+        frame = self.frames[-1]
+        if frame.jumps:
+            self.jumped.append(self.count)
+        return frame.start
 
     def perhaps_call(self, block: int, verb: str, statement: FlowStatement | None) -> None:
         """A call that may run or not: the blocks of what it calls may run more often than they are followed."""
@@ -89,25 +96,19 @@ class RunCalls(RunState):
             part = self.labels.program(statement.label)
             return None if part is None else (*part, 1, self.variables.own())
         if verb == "named":
-            number = self.word(block, "L")
+            number, runs = self.word(block, "L"), self.runs(block, "P")
             part = self.labels.program(f"L{number:.0f}") if not math.isnan(number) else None
-            count = self.word(block, "P")
-            return (
-                None
-                if part is None
-                else (*part, 1 if math.isnan(count) else int(count), self.variables.own())
-            )
-        number, count = self.word(block, "P"), self.word(block, "L")
-        if verb == "call" and not math.isnan(self.word(block, "Q")):
+            return None if part is None or runs is None else (*part, runs, self.variables.own())
+        number, runs = self.word(block, "P"), self.runs(block, "L")
+        if verb == "call" and self.last_word(block, "Q") >= 0:
             return None  # it starts at a block of the subprogram
-        if math.isnan(number) or number != math.floor(number):
+        if math.isnan(number) or number != math.floor(number) or runs is None:
             return None
-        runs = 1 if math.isnan(count) else int(count)
         if verb == "local":
             start = self.labels.number(int(number), block)
             return None if start is None else (start, self.n, runs, None)
         part = self.labels.program(f"{number:.0f}")
-        if part is None and number >= PACKED and math.isnan(count):
+        if part is None and number >= PACKED and self.last_word(block, "L") < 0:
             runs, part = int(number) // PACKED, self.labels.program(f"{int(number) % PACKED}")
         if part is None:
             return None
@@ -116,6 +117,13 @@ class RunCalls(RunState):
             given = {f"#{_ARGUMENTS[one]}": value for one, value in words.items() if not math.isnan(value)}
             return (*part, runs, given)
         return (*part, runs, None)
+
+    def runs(self, block: int, letter: str) -> int | None:
+        """How often a call runs, by the word of this letter; None where that is not known."""
+        if self.last_word(block, letter) < 0:
+            return 1
+        count = self.word(block, letter)
+        return int(count) if count >= 0 and count == math.floor(count) else None
 
     def called_label(self, statement: FlowStatement) -> str:
         """What a call names; O#1 and O[#1+1] with the number that they give."""
@@ -135,7 +143,7 @@ class RunCalls(RunState):
         frame = self.frames[-1]
         frame.count -= 1
         if frame.count > 0:
-            return frame.start
+            return self.enter_part()
         self.frames.pop()
         if frame.locals is not None:
             self.variables.leave(frame.locals)
@@ -162,8 +170,9 @@ class RunCalls(RunState):
             if count < 1:
                 return block + 1
             raise NotFollowed
-        self.frames.append(CallFrame(block + 1, start, stop, int(count), block, None))
-        return start
+        through = statement.direction != "B"
+        self.frames.append(CallFrame(block + 1, start, stop, int(count), block, None, True, through))
+        return self.enter_part()
 
     def hide(self, block: int) -> None:
         """Has the program followed again, with what a block opens or calls as what may run or not.  Raises RunAgain."""

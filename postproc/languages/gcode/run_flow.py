@@ -24,6 +24,8 @@ class RunFlow(RunCalls):
                 self.emit(at, min(limit, self.n))
                 if not self.frames:
                     return limit
+                if self.frames[-1].through:
+                    self.reached.append((self.count, limit))
                 if limit >= self.n:  # a subprogram without an end
                     raise NotFollowed
                 at = self.leave()
@@ -45,9 +47,10 @@ class RunFlow(RunCalls):
         if block in self.conditions:
             holds = self.value(self.conditions[block][0], block)
             if holds == 0:
+                self.reached.append((self.count, block))
                 return block + 1
             if not math.isnan(holds):
-                self.taken[self.count] = True
+                self.held.append(self.count)
                 return self.certain(block, statement)
         if block in self.deleted:
             return self.perhaps(block, statement)
@@ -101,6 +104,7 @@ class RunFlow(RunCalls):
             return self.maybe(around)
         if verb == Verb.SUB:
             assert around is not None
+            self.emit(block, block + 1)
             return around.stop + 1
         if verb == Verb.CALL:
             return self.call(block, "call", self.count)
@@ -114,6 +118,7 @@ class RunFlow(RunCalls):
         if verb == Verb.RETURN:
             if not self.frames:
                 raise NotFollowed
+            self.emit(block, block + 1)
             self.returned(statement)
             return self.leave()
         if verb == Verb.BREAK:
@@ -122,12 +127,14 @@ class RunFlow(RunCalls):
             return around.stop + 1
         if verb == Verb.CONTINUE:
             if around.verb != Verb.WHILE:
+                self.jumped.append(self.count)
                 return around.stop
             self.emit(block, block + 1)
             return self.loop(around, self.shape.statements[around.stop])
         if around.verb == Verb.SUB:
             if not self.frames:
                 raise NotFollowed
+            self.emit(block, block + 1)
             self.returned(statement)
             return self.leave()
         self.emit(block, block + 1)
@@ -201,6 +208,7 @@ class RunFlow(RunCalls):
         """A construct that may run or not, once or often."""
         self.escape(around.start, around.stop + 1)
         self.kill(around.start, around.stop + 1)
+        self.doubtful.append((self.count + 1, self.count + around.stop - around.start))
         self.perhaps_range(around.start, around.stop + 1)
         return around.stop + 1
 
@@ -248,6 +256,7 @@ class RunFlow(RunCalls):
         if target is None:
             raise NotFollowed
         self.entered.append(self.count)
+        self.jumped.append(self.count)
         return target
 
     def computed(self, statement: FlowStatement) -> FlowStatement:
@@ -290,6 +299,7 @@ class RunFlow(RunCalls):
         if self.labels.between(start, stop):
             raise NotFollowed
         self.kill(start, stop)
+        self.doubtful.append((self.count + 1, self.count + stop - start))
         self.emit(start, start + 1)
         self.perhaps_range(start + 1, stop)
         self.entered.append(self.count)

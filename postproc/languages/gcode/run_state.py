@@ -31,7 +31,8 @@ STEPS, BLOCKS = 50_000, 200_000
 
 @dataclass
 class CallFrame:
-    """Where a call goes back to, what is repeated and until where; locals: the variables of the caller."""
+    """Where a call goes back to, what is repeated and until where; locals: the variables of the caller; jumps: it
+    starts at a label, past what is before that; through: its end is a label, which is reached from before."""
 
     back: int
     start: int
@@ -39,6 +40,8 @@ class CallFrame:
     count: int
     call: int
     locals: dict[str, float] | None
+    jumps: bool = False
+    through: bool = False
 
 
 class RunState:
@@ -80,9 +83,14 @@ class RunState:
         self.ranges: list[tuple[int, int, bool]] = []
         self.count = 0
         self.rows: list[tuple[int, int, int, float, int]] = []
-        self.taken: dict[int, bool] = {}  # step of a block after a condition -> whether that holds
+        self.held: list[int] = []  # steps of blocks after a condition that holds
         self.called: list[int] = []
         self.entered: list[int] = []
+        self.jumped: list[int] = []  # steps that are reached by a jump, past what is written before them
+        # first and last step of what may be passed or not
+        self.doubtful: list[tuple[int, int]] = []
+        # steps before which the run comes to a block that is none of it
+        self.reached: list[tuple[int, int]] = []
         self.unknown: dict[str, int] = {}
         self.integers: set[str] = set()  # names that hold whole numbers only
         self.frames: list[CallFrame] = []

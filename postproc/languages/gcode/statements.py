@@ -153,7 +153,9 @@ def structure(notes: Iterable[Note]) -> Structure:
         if one.block in statements:
             raise NotFollowed
         statements[one.block] = one
-        closes_do = one.verb == Verb.WHILE and stack and stack[-1].label == one.label
+        # a WHILE of a Sinumerik has no label of its own: inside of another one it is a loop of its own
+        named = one.verb == Verb.WHILE and one.label != Verb.WHILE.name
+        closes_do = named and stack and stack[-1].label == one.label
         if closes_do and stack[-1].verb != Verb.DO:
             raise NotFollowed
         if one.verb in (Verb.BREAK, Verb.CONTINUE, Verb.RETURN):

@@ -21,7 +21,7 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.units import DEG
 from postproc.languages.gcode.blocks import BlockWords
-from postproc.languages.gcode.control import Group, ToolAxis
+from postproc.languages.gcode.control import Group, Once, ToolAxis
 from postproc.languages.gcode.modal_fill import everywhere
 from postproc.languages.gcode.orientation_words import Angles, OrientationWords, Vector, swing
 from postproc.languages.gcode.positions import Positions, Trace
@@ -93,7 +93,8 @@ class ToolOrientations:
         turn_part: without a TCP mode rotary axes turn the part."""
         self._given, self._turned, self.turn_part = words, turned, turn_part
         self._tcp = words.modal.force[Group.TCP] == 1
-        self._used = np.array([len(words.words(one)) > 0 for one in _ROTARY_KEYS])
+        turning = ~words.modal.has(Once.CALL)  # words of G65 are variables of what it calls
+        self._used = np.array([bool(turning[words.words(one).block].any()) for one in _ROTARY_KEYS])
         others = (*words.control.vector, *words.control.euler)
         self._none = not self._used.any() and not any(len(words.words(one)) for one in others)
         if not self._none:
