@@ -32,13 +32,22 @@ def test_a_larger_radius_lies_nearer_to_the_wall_on_its_side_of_the_feed(side, s
     job = circle()
     rows = np.flatnonzero(job.desired_path.traceable & job.desired_path.arc)
     tool = np.ones(len(job.toolpath), np.int64)
-    shift = displacement(job, tool, radius={1: 3e-4}, side={(1, "FINISH"): side})
+    assert (rows % 2 == 0).all()
+    shift = displacement(job, tool, radius={1: 3e-4}, side={(1, "ROUGH"): side, (1, "FINISH"): -side})
     along = np.full(len(rows), share)
     found = shift.at(rows, job.desired_path.at(rows, along), along)
     right = np.cross([0.0, 0.0, -1.0], job.desired_path.tangent(rows, along))
     right /= np.linalg.norm(right, axis=1, keepdims=True)
-    walls = np.where(rows % 2 == 1, side * 3e-4, 0.0)
-    np.testing.assert_allclose(found, walls[:, None] * right, atol=1e-12)
+    np.testing.assert_allclose(found, side * 3e-4 * right, atol=1e-12)
+    assert np.abs(found).max() > 2e-4 or side == 0
+    if share == 1.0:  # which is where a motion ends
+        np.testing.assert_array_equal(shift.at(rows, job.desired_path.at(rows, along)), found)
+    # another tool, or this one in an operation of which no side is known, lies nowhere else
+    for other in (
+        displacement(job, tool, radius={2: 3e-4}, side={(2, "ROUGH"): 1}),
+        displacement(job, tool, radius={1: 3e-4}, side={(1, "FINISH"): 1, (2, "ROUGH"): 1}),
+    ):
+        assert (other.at(rows, job.desired_path.at(rows, along), along) == 0).all()
 
 
 def test_where_the_feed_is_along_the_spindle_no_wall_is_beside_it():

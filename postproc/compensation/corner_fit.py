@@ -412,7 +412,7 @@ def _least_largest(
         won = largest < least
         best[won], least[won] = step[won], largest[won]
         given = given * (remains / largest[group])
-        given = np.maximum(given / np.maximum.reduceat(given, edges)[group], 1e-6)
+        given = np.maximum(given / np.maximum(np.maximum.reduceat(given, edges), 1e-300)[group], 1e-6)
     size = np.diff(fitted.group_start[part.start : part.stop + 1])
     inside: Bools = np.arange(width) < size[:, None]
     return np.asarray(best[inside])

@@ -114,8 +114,8 @@ class Curves:
         before, after = parameter < first, parameter > stop
         number = np.where(before, 1.0 - (first - parameter) / (first - ends[:, :1]), number)
         number = np.where(after, last + (parameter - stop) / (ends[:, 1:] - stop), number)
-        number = np.clip(number, 0.0, last + 0.999)
-        low = number.astype(np.int64)
+        number = np.clip(number, 0.0, last + 1.0)
+        low = np.minimum(number.astype(np.int64), last)
         size = np.where(low == 0, first - ends[:, :1], np.where(low == last, ends[:, 1:] - stop, step))
         return low, (number - low)[..., None], size[..., None]
 
@@ -156,7 +156,7 @@ def fit_points(
         if not len(some):
             break
         off, slope = best.off[some], best.slope[some]
-        step = _least_largest(off, slope, damping[some]).reshape(len(some), -1, 3)
+        step = least_largest(off, slope, damping[some]).reshape(len(some), -1, 3)
         step *= np.minimum(1.0, trust[some] / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-15))[:, None, None]
         moved = best.points[some]
         moved[:, 1:-1] += step
@@ -204,7 +204,7 @@ def moved_apart(points: Floats, shortest: Floats) -> Floats:
     return points
 
 
-def _least_largest(off: Floats, slope: Floats, damping: Floats) -> Floats:
+def least_largest(off: Floats, slope: Floats, damping: Floats) -> Floats:
     """(G, V) steps with which the largest of ``off`` (G, S, 3) + ``slope`` (G, S, 3, V) steps is least, damped."""
     groups, samples, _, free = slope.shape
     flat, side = slope.reshape(groups, 3 * samples, free), off.reshape(groups, 3 * samples, 1)

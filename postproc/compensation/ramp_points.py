@@ -201,9 +201,9 @@ def _ramps(
     place = division.share[inserted] * length[division.source[inserted]]
     behind = np.where(exact, np.inf, length[row - 1] - taken[row - 1])
     for k in range(len(row)):
-        here = inserted[division.source[inserted] == row[k]], place[division.source[inserted] == row[k]]
-        inner[k] = int((here[1] <= last[k]).sum())
-        further = here[1][here[1] > last[k]]
+        here = place[division.source[inserted] == row[k]]
+        inner[k] = int((here <= last[k]).sum())
+        further = here[here > last[k]]
         beyond[k] = min(beyond[k], *(further - end[k])) if len(further) else beyond[k]
         others = place[
             (division.source[inserted] == row[k] - 1) & (place > taken[row[k] - 1] + 2.0 * spacing[k, 0])

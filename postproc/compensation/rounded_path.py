@@ -23,7 +23,7 @@ from postproc.compensation.desired_path import interpolate_poses
 from postproc.compensation.gap_sides import GapSides
 from postproc.compensation.path_error import PathSegments
 from postproc.compensation.problem import CompensationProblem
-from postproc.compensation.run_sides import ON_LINE, ON_PARABOLA, Stations, rounded_sides
+from postproc.compensation.run_sides import ON_LINE, ON_PARABOLA, SAME_PLACE, Stations, rounded_sides
 from postproc.compensation.subdivision import Subdivision, subdivided_motions
 
 ROUNDS, SETTLED = 6, 2e-8
@@ -284,13 +284,15 @@ def _sides_of_output(task: CompensationProblem, division: Subdivision) -> GapSid
     lost, source = task.lost_motion, division.source
     assert lost is not None
     ends = 2.0 * source + np.where(division.transitions, 0.0, division.share)
-    motion = np.searchsorted(ends, 2.0 * lost.row + lost.share - 1e-12)
+    motion = np.searchsorted(ends, 2.0 * lost.row + lost.share - SAME_PLACE)
     motion = np.where(lost.row < 0, -1, np.minimum(motion, len(division) - 1))
     first = _first_shares(division)
     extent = np.maximum(division.share - first, NEAREST)
     share = np.where(lost.row < 0, 1.0, np.clip((lost.share - first[motion]) / extent[motion], 0.0, 1.0))
     motor = lost.motors(task.gain)
     stations = Stations(motion, share, lost.row, lost.share, motor, lost.restart)
+    own = np.flatnonzero(~division.transitions)
+    stations = stations.with_ends(own, source[own], division.share[own])
     near = stations.crossing(lost)
     near = near[(near >= 0) & (near < len(division))]
     moved = task.desired_path.traceable & (task.desired_path.length > 0) & (task.track.branch >= 0)

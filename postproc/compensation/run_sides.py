@@ -24,6 +24,10 @@ ON_LINE, ON_PARABOLA = np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 9)
 ends."""
 
 
+SAME_PLACE = 1e-12
+"""Share of a motion that is none."""
+
+
 @dataclass(frozen=True, eq=False)
 class Stations:
     """S places on motions, in order.  motion, share (S,): of the run and of its path; row, along (S,): of the program
@@ -48,6 +52,24 @@ class Stations:
             for name in self.__dataclass_fields__
         )
         return Stations(*both)
+
+    def with_ends(self, motion: Ints, row: Ints, along: Floats) -> Stations:
+        """These and the ends of the motions ``motion`` (K,), at the shares ``along`` (K,) of the paths of ``row`` (K,),
+        between two stations of their paths: there every axis is monotone.  Of a motion without a station no side would
+        be known."""
+        key, end = 2.0 * self.row + self.along, 2.0 * row + along
+        later = np.minimum(np.searchsorted(key, end - SAME_PLACE), len(key) - 1)
+        before = np.maximum(later - 1, 0)
+        new = (self.row[later] == row) & (key[later] > end + SAME_PLACE) & (later > 0)
+        new &= (self.row[before] == row) | ~self.restart[later]
+        later, before, end = later[new], before[new], end[new]
+        since = np.maximum(key[before], 2.0 * row[new])
+        part = ((end - since) / (key[later] - since))[:, None]
+        motor = self.motor[before] + part * (self.motor[later] - self.motor[before])
+        count = int(new.sum())
+        return self.joined(
+            Stations(motion[new], np.ones(count), row[new], along[new], motor, np.zeros(count, bool))
+        )
 
     def sides(self, lost: LostMotion) -> GapSides:
         """The play of the motors."""
