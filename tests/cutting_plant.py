@@ -37,7 +37,8 @@ def wall_near(wall, floor, x, z):
     low = max(z, floor + 0.01)
     r = min(max(-low / 0.05, 0.0), wall.shape[1] - 1.001)
     k = int(r)  # row k is at -0.05 k, above
-    if -0.05 * (k + 1) < floor:  # the row below is in what is not cut: go on from those above
+    # a row as low as the floor is met by some places of a tilted tool only: go on from those above
+    if -0.05 * (k + 1) < floor + 0.02:
         k = max(k - 1, 0)
     t = -z / 0.05 - k
     upper = wall[a, k] * (1 - s) + wall[a + 1, k] * s

@@ -84,6 +84,19 @@ def test_walls_in_any_direction(tilt):
     within_goal("walls at 17, 45, 88 deg", "force %", force_off(cut.mean[3, :3], force), 0.5)
 
 
+@pytest.mark.parametrize("width", [0.3, 0.5, 0.592, 0.5945, 0.597, 1.2, 3.0])
+def test_walls_above_a_floor_that_is_cut_already(width):
+    """Where the bottom of the tool runs on the floor that the pass before left, both are the nearest surface beside the
+    wall: circles there end where the others do."""
+    ends = [[-112, -8, -8], [140, -8, -8], [-112, width - 8, -8], [100, width - 8, -8]]
+    path = path_through(ends, kinds=[Kind.PTP, Kind.LIN, Kind.PTP, Kind.LIN])
+    cut = run(path, block([-100, -60, -30], [120, 60, 0]), FLAT)
+    force, entry, out = expected("up", width * MM, 8 * MM)
+    within_goal("walls above a floor", "angle deg", angles_off(cut, 3, entry, out), 0.1)
+    assert cut.width[3] / MM == pytest.approx(width, abs=2e-3)
+    within_goal("walls above a floor", "force %", force_off(cut.along[3, 1, :3], force), 0.1)
+
+
 def test_entry_ramps_over_the_radius():
     """Half way into a face the first teeth cut what the circle over the face says: acos of the depth of entry."""
     entered = 3.0  # mm of the radius 8 beyond the face

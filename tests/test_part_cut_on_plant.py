@@ -155,6 +155,8 @@ def test_the_part_as_written_is_the_one_that_the_machine_cuts(reported):
             print(f"{name}: largest deflection {large[name]:.3f} mm; apart by {1e3 * apart:.1f} um,", end=" ")
             print(f"{1e3 * allowed:.1f} with the goal of the force")
         assert np.percentile(np.abs(error - true), 99) < 8e-3
+        for name in ("wall", "floor"):
+            assert np.percentile(np.abs(found[name][0] - found[name][1]), 90) < 2e-3, name
         for name, most in (("wall", 6e-3), ("floor", 1e-3), ("wave", 12e-3)):
             assert np.abs(found[name]).max() < 1e3 * task.tolerance, name
             assert np.abs(found[name][0] - found[name][1]).max() < most, name

@@ -19,6 +19,16 @@ LOADED = 150_000
 has 85,000 of them at its end."""
 
 
+def free_memory() -> int | None:
+    """Bytes that programs may still take without swapping; None where the system does not say."""
+    try:
+        with open("/proc/meminfo") as stream:
+            lines = dict(line.split(":") for line in stream)
+        return int(lines["MemAvailable"].split()[0]) << 10
+    except (OSError, KeyError, ValueError):
+        return None
+
+
 def release_free_memory() -> None:
     """Give free memory back to the system: the C library (glibc) keeps what lies between blocks that are in use."""
     _allocator("malloc_trim", 0)

@@ -25,7 +25,7 @@ from typing import IO, Any, TypeVar
 
 from postproc.base.array_memory import handler_for, is_allocating, set_handler
 from postproc.base.findings import Code, Finding, Refusal, define
-from postproc.base.memory import without_garbage_collection
+from postproc.base.memory import free_memory, without_garbage_collection
 
 T = TypeVar("T")
 
@@ -385,7 +385,7 @@ def temporary_folder(room: int, program: Path) -> str | None:
         most = max(most, status.f_bavail * status.f_frsize)
         if most >= room:
             return name
-    if _free_memory() < room:
+    if (free_memory() or 0) < room:
         message = (
             f"the disk has {most / 1e9:.1f} GB free, and this program needs up to {room / 1e9:.1f} GB there"
         )
@@ -401,10 +401,3 @@ def _is_on_disk(folder: str) -> bool:
     with open("/proc/self/mountinfo") as stream:
         kinds = {line.partition(" - ")[2].split()[0] for line in stream if line.split()[2] == there}
     return bool(kinds) and not kinds & {"tmpfs", "ramfs"}
-
-
-def _free_memory() -> int:
-    """Bytes that programs may still take without swapping."""
-    with open("/proc/meminfo") as stream:
-        lines = dict(line.split(":") for line in stream)
-    return int(lines["MemAvailable"].split()[0]) << 10

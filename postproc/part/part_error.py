@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
-from postproc.base.findings import Finding
+from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import lengths
 from postproc.base.units import DEG, MM
 from postproc.compensation.problem import CompensationProblem
@@ -98,6 +98,10 @@ def find_part_error(
             else _side(nominal, replace(one, wrench=forces.along), forces.pieces)
             for one, forces in zip(every, solved, strict=True)
         ]
+    except (
+        Refusal
+    ) as too_large:  # sweeps of displaced tools in parts of millimetres need more than the program's
+        return Finding("PRT001", too_large.findings[0].message, task.file)
     except _UnknownDisplacement as unknown:
         lost = unknown.args[0]
         message = f"the displacement of the tool is not known in {len(lost)} motions that reach the part"

@@ -34,6 +34,7 @@ from postproc.process.stock.distance import (
     tip_at,
     turn_of,
 )
+from postproc.process.stock.memory_need import check_memory
 
 CELL = 0.125  # radii of the smallest cutter
 MOST_CELLS = 4_000_000
@@ -69,7 +70,7 @@ def build_stock(
 
     The heights are the lowest and highest above its tip at which it may meet stock, inf and -inf where it meets none.
     ``reach`` [m]: distances are known so far at least.  ``slack`` [m]: by so much the sweeps may still be displaced,
-    each by another shift, without being listed again.
+    each by another shift, without being listed again.  Refusal STK031: more memory is needed than is free.
     """
     low, high = corners_of(blank)
     span = high - low
@@ -92,6 +93,7 @@ def build_stock(
     _list(stock, joins, (count, none, none), covered, live, False, slack)
     first = np.zeros(cells + 1, np.int64)
     np.cumsum(count, out=first[1:])
+    check_memory(len(sweeps), cells, int(first[-1]))
     near, stop = (np.zeros(max(int(first[-1]), 1), np.int32) for _ in range(2))
     _list(stock, joins, (first[:-1].copy(), near, stop), covered, live, True, slack)
     return stock._replace(first=first, near=near, stop=stop), live

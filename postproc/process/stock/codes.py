@@ -247,5 +247,14 @@ CODES = define(
             action="Compare the bottom of the blank with the program, and with what is below it.",
             example="A blank of 5 mm for a program that cuts 8 mm deep.",
         ),
+        "STK031": Code(
+            "error",
+            "stock needs more memory than is free",
+            meaning="So many parts of motions, or of them near the cells of the blank, do not fit into memory.",
+            consequence="Nothing is simulated and nothing is written.",
+            action="Check the diameter of the smallest tool, whose radius divides the motions; or state a smaller"
+            " blank, or run the program in parts, each with its own blank.",
+            example="Ten million motions on a computer with 8 GB.",
+        ),
     }
 )

@@ -14,11 +14,10 @@ from postproc.process.stock.contact import (
     CutterCircle,
     SweepCutters,
     find_arcs,
-    height_range,
     lent_cutters,
     set_pose,
 )
-from postproc.process.stock.distance import CUTTER, REMOVES
+from postproc.process.stock.distance import CUTTER, REMOVES, height_range
 
 DEEP, NARROW = 0.02 * MM, 0.3 * MM
 """A collision is deeper than the first and wider than the second."""

@@ -34,6 +34,7 @@ from postproc.process.stock.distance import (
     STEP,
     TURN,
     axis_at,
+    height_range,
     tip_at,
 )
 
@@ -48,6 +49,7 @@ NEAR_ZERO = 2e-7
 _LEAST_STOCK = 1e-8  # m: thinner is a digit of a number
 _LEAST_ARC = 0.02 * np.pi / 180
 _SMALL_ARC, _SMALLER_ARC, _STRAIGHT_ENOUGH = 12.0 * np.pi / 180, 1.0 * np.pi / 180, 0.02
+_GRAZING = 0.01
 _LEAST_SHARE = 2e-4  # of the radius: the shortest length of profile
 _EVEN, _EVEN_AT_END = 2e-3, 3e-4  # change of a panel's integrals that ends its halving, as a share of all
 _BENT = 0.2
@@ -176,6 +178,13 @@ def _add_above_zero(arc: Floats, a: float, ga: float, b: float, gb: float, r: fl
 
 
 @compiled
+def _grazes(ga: float, gb: float) -> bool:
+    """Whether one of two distances of unlike sign is too small against the other for a line to say where zero is: just
+    outside of stock the nearest surface may be another one, such as the floor below a wall."""
+    return (ga > 0.0) != (gb > 0.0) and min(abs(ga), abs(gb)) < _GRAZING * max(abs(ga), abs(gb))
+
+
+@compiled
 def find_arcs(stock: Stock, pose: Floats, circle: CutterCircle, time: int, arc: Floats) -> None:
     """The arcs of ``circle`` with stock before the sweep ``time``, put into ``arc`` (12,): integrals, extremes and
     ends.  pose (6, 3): of ``set_pose``."""
@@ -210,9 +219,11 @@ def find_arcs(stock: Stock, pose: Floats, circle: CutterCircle, time: int, arc: 
                 bend = abs(ga - 2.0 * g + gb)
                 if abs(g) < NEAR_ZERO and abs(ga) < NEAR_ZERO and abs(gb) < NEAR_ZERO and b - a < 0.3:
                     arc[BOUND] = max(arc[BOUND], NEAR_ZERO)
-                elif (b - a < _SMALL_ARC and bend < _STRAIGHT_ENOUGH * (abs(ga) + abs(gb))) or (
-                    b - a < _SMALLER_ARC and (ga > 0.0) == (g > 0.0) and (gb > 0.0) == (g > 0.0)
-                ):
+                elif (
+                    b - a < _SMALL_ARC
+                    and bend < _STRAIGHT_ENOUGH * (abs(ga) + abs(gb))
+                    and not (_grazes(ga, g) or _grazes(g, gb))
+                ) or (b - a < _SMALLER_ARC and (ga > 0.0) == (g > 0.0) and (gb > 0.0) == (g > 0.0)):
                     # no boundary of the stock turns here: one that is crossed is where a line says
                     arc[BOUND] = max(arc[BOUND], max(ga, max(g, gb)))
                     arc[_GREATEST] = max(arc[_GREATEST], g)
@@ -322,22 +333,6 @@ def _set_node_by(
     if arc[_FIRST] <= middle <= arc[_LAST]:
         thickest = size
     contact[CHIP] = max(contact[CHIP], chip * (thickest + c))
-
-
-@compiled
-def height_range(element: Floats, low: float, high: float) -> tuple[float, float]:
-    """The lengths [m] of a profile ``element`` (8,) between two heights above the tip."""
-    long = element[7]
-    if element[1] == 0.0:
-        rise = element[5] - element[3]
-        if abs(rise) < 1e-12:
-            return (0.0, long) if low <= element[3] <= high else (0.0, 0.0)
-        first, last = long * (low - element[3]) / rise, long * (high - element[3]) / rise
-        return min(max(first, 0.0), long), min(max(last, 0.0), long)
-    radius = element[4]
-    below = min(max((element[3] - low) / radius, 0.0), 1.0)
-    above = min(max((element[3] - high) / radius, 0.0), 1.0)
-    return radius * np.arccos(below), radius * np.arccos(above)
 
 
 @compiled

@@ -52,6 +52,22 @@ def cutter_distance(cutters: Floats, c: int, across: float, height: float) -> fl
 
 
 @compiled
+def height_range(element: Floats, low: float, high: float) -> tuple[float, float]:
+    """The lengths [m] of a profile ``element`` (8,) between two heights above the tip."""
+    long = element[7]
+    if element[1] == 0.0:
+        rise = element[5] - element[3]
+        if abs(rise) < 1e-12:
+            return (0.0, long) if low <= element[3] <= high else (0.0, 0.0)
+        first, last = long * (low - element[3]) / rise, long * (high - element[3]) / rise
+        return min(max(first, 0.0), long), min(max(last, 0.0), long)
+    radius = element[4]
+    below = min(max((element[3] - low) / radius, 0.0), 1.0)
+    above = min(max((element[3] - high) / radius, 0.0), 1.0)
+    return radius * np.arccos(below), radius * np.arccos(above)
+
+
+@compiled
 def rotated(
     vx: float, vy: float, vz: float, kx: float, ky: float, kz: float, share: float
 ) -> tuple[float, float, float]:

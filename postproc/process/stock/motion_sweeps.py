@@ -30,6 +30,7 @@ from postproc.process.stock.distance import (
     TIP_POINT,
     TURN,
 )
+from postproc.process.stock.memory_need import check_memory
 from postproc.process.stock.stock_section import StockProcess
 from postproc.toolpath import Kind, OrientationPath, Toolpath
 
@@ -65,7 +66,8 @@ def find_sweeps(
     toolpath: Toolpath, frames: MotionFrames, process: StockProcess, low: Floats, high: Floats, program: str
 ) -> MotionSweeps:
     """The sweeps of a program.  low, high (3,) [m]: the box around the blank, beside which nothing is divided.  Refusal
-    STK006: a tool that cuts is not stated; STK007: nothing can be simulated; STK010: the base of the stock."""
+    STK006: a tool that cuts is not stated; STK007: nothing can be simulated; STK010: the base of the stock; STK031:
+    more memory is needed than is free."""
     stock = _stock_in_robot(toolpath, frames, process, program)
     pose = stock.inverse() @ frames.base_in_robot
     turned = np.broadcast_to(pose.rotation, (len(toolpath), 3, 3))
@@ -102,7 +104,9 @@ def find_sweeps(
         (ends.max(axis=0) + wide[:, None] < low) | (ends.min(axis=0) - wide[:, None] > high), axis=1
     )
     straight = np.linalg.norm(step, axis=1) / (_LONGEST * radius.min())
-    parts = np.maximum(np.where(beside, parts, np.maximum(parts, np.ceil(straight))), 1).astype(np.int64)
+    parts = np.maximum(np.where(beside, parts, np.maximum(parts, np.ceil(straight))), 1)
+    check_memory(int(parts.sum()), file=program)
+    parts = parts.astype(np.int64)
 
     owner = np.repeat(np.arange(len(row)), parts)
     place = np.arange(len(owner)) - np.repeat(np.cumsum(parts) - parts, parts)

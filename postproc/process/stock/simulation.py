@@ -63,7 +63,7 @@ def simulate(path: Path, toolpath: Toolpath, frames: MotionFrames, program: str)
     """Run a program through the stock of the process file ``path``.
 
     Refusal: of the file; STK002 to STK005, STK016: of the blank; STK006, STK007, STK010: of tools and frames; STK008:
-    no motion reaches the stock.
+    no motion reaches the stock; STK031: more memory is needed than is free.
     """
     commented = read_tool_comments(toolpath)
     process = read_stock_process(path, commented)
