@@ -5,13 +5,16 @@ other.  Where lines as short as they may be decide how near a polygon comes, tha
 each step is a linear programme: by the slopes of the errors it makes the largest of them least, within a box around the
 points, and with no line shorter than it may be.  The length of a line is convex in its ends: one that is long enough by
 its slope is so in truth (sequential linear programming: Fletcher and Sainz de la Maza 1989).
+
+A curve turns at some places, and each has its own largest error: the sum of them is made least.  If only the largest of
+all were, a place with a smaller error would come no nearer, and would hold the others up by where its points are.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from postproc.base.arrays import Floats
+from postproc.base.arrays import Floats, Ints
 from postproc.base.units import MM
 from postproc.compensation.point_fit import (
     LONGEST,
@@ -54,30 +57,45 @@ def closest_points(
     best = evaluate_polygons(curve, points, reach, None, parameter, vertex)
     if not long_enough(points, shortest)[0]:
         return points, np.inf
-    box, past = FIRST, [float(best.largest[0])]
+    past, box = [_sum_of_largest(curve, best, enough)], FIRST
     for _ in range(STEPS):
-        if past[-1] <= enough or box < SHORTEST or (len(past) > SOME and past[-1] > GAIN * past[-1 - SOME]):
+        done = best.largest[0] <= enough or (len(past) > SOME and past[-1] > GAIN * past[-1 - SOME])
+        if done or box < SHORTEST:
             break
-        step = _step(curve, best, shortest[0], box)
+        step = _step(curve, best, shortest[0], box, enough)
         moved = best.points.copy()
         moved[0, 1:-1] += step
         found = evaluate_polygons(curve, moved, reach, best.parameter, best.label, vertex)
-        if long_enough(moved, shortest)[0] and found.largest[0] < past[-1]:
+        size = _sum_of_largest(curve, found, enough)
+        if long_enough(moved, shortest)[0] and size < past[-1]:
             best, box = found, min(WIDER * box, LONGEST)
-            past.append(float(found.largest[0]))
+            past.append(size)
         else:
             box *= NARROWER
-    return best.points, past[-1]
+    return best.points, float(best.largest[0])
 
 
-def _step(curve: Curves, polygon: Polygons, shortest: Floats, box: float) -> Floats:
+def _turn_nearest(curve: Curves, polygon: Polygons) -> Ints:
+    """(S,) the number of the turn of the curve that is nearest to each place of the polygon."""
+    turn = curve.turn[0]
+    return np.searchsorted(0.5 * (turn[1:] + turn[:-1]), polygon.parameter[0])
+
+
+def _sum_of_largest(curve: Curves, polygon: Polygons, enough: float) -> float:
+    """[m] The largest errors beside each turn of the curve, ``enough`` [m] at least, together."""
+    largest = np.full(curve.turn.shape[1], enough)
+    np.maximum.at(largest, _turn_nearest(curve, polygon), np.linalg.norm(polygon.off[0], axis=1))
+    return float(largest.sum())
+
+
+def _step(curve: Curves, polygon: Polygons, shortest: Floats, box: float, enough: float) -> Floats:
     """(K - 2, 3) [m] by how much the inner points move, ``box`` [m] at most in each coordinate."""
     from scipy.optimize import linprog  # where it is needed alone
 
-    off, slope = polygon.off[0], polygon.slope[0]
+    off, slope, turn = polygon.off[0], polygon.slope[0], _turn_nearest(curve, polygon)
     size = np.linalg.norm(off, axis=1)
     some = size > LITTLE * size.max()
-    off, slope, size = off[some], slope[some], size[some]
+    off, slope, size, turn = off[some], slope[some], size[some], turn[some]
     tangent = curve.at(polygon.parameter)[1][0][some]
     one = off / np.maximum(size, 1e-15)[:, None]
     two = np.cross(tangent, one)
@@ -96,11 +114,12 @@ def _step(curve: Curves, polygon: Polygons, shortest: Floats, box: float) -> Flo
     shorter[numbers, numbers], shorter[numbers, numbers + 1] = line, -line
     lines = shorter[:, 1:-1].reshape(count, width)
 
-    rows = np.block([[errors, -np.ones((len(errors), 1))], [lines, np.zeros((count, 1))]])
+    turns = curve.turn.shape[1]
+    largest = np.tile(turn, len(ways))[:, None] == np.arange(turns)
+    rows = np.block([[errors, -largest.astype(float)], [lines, np.zeros((count, turns))]])
     most = MICRO * np.concatenate([-now, np.minimum(length - shortest, 1.0)])
-    sides = [(-MICRO * box, MICRO * box)] * width
-    solved = linprog(
-        np.append(np.zeros(width), 1.0), rows, most, bounds=[*sides, (0.0, None)], method="highs"
-    )
+    sides = [*[(-MICRO * box, MICRO * box)] * width, *[(MICRO * enough, None)] * turns]
+    cost = np.append(np.zeros(width), np.ones(turns))
+    solved = linprog(cost, rows, most, bounds=sides, method="highs")
     step = np.zeros(width) if solved.x is None else solved.x[:width] / MICRO
     return np.asarray(step.reshape(-1, 3))

@@ -87,9 +87,9 @@ STARTS: tuple[tuple[Words, ...], ...] = (
 
 CLOSE_STARTS: tuple[tuple[Words, float], ...] = (
     (_both(range(-1, 2), range(-1, 2)), 1.02),
-    (_both(range(-1, 3), range(-1, 2)), 1.02),
-    (_both(range(-1, 3), range(-2, 2)), 1.02),
+    (_both(range(-2, 3), range(-1, 3)), 1.02),
     (_both(range(-2, 3), range(-2, 3)), 1.02),
+    (_both(range(-2, 3), range(-2, 3)), 1.4),
 )
 """Where points start that are fitted closely, as near to each other as the shortest motion lets them, and by which
 factor lines are longer than that."""
