@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,12 +88,13 @@ STARTS: tuple[tuple[Words, ...], ...] = (
 
 CLOSE_STARTS: tuple[tuple[Words, float], ...] = (
     (_both(range(-1, 2), range(-1, 2)), 1.02),
-    (_both(range(-2, 3), range(-1, 3)), 1.02),
     (_both(range(-2, 3), range(-2, 3)), 1.02),
-    (_both(range(-2, 3), range(-2, 3)), 1.4),
+    (_both(range(-2, 3), range(-2, 3)), 1.1),
+    (_both(range(-2, 3), range(-2, 3)), 1.2),
 )
 """Where points start that are fitted closely, as near to each other as the shortest motion lets them, and by which
-factor lines are longer than that."""
+factor lines are longer than that: of those that are as short as they may be none can turn at first, and which of them
+lead on depends on the curve."""
 
 ON = 1e-5
 """[m] The next point is farther on by so much at least."""
@@ -189,6 +191,14 @@ class CloseFits:
 
     def __init__(self) -> None:
         self._known: dict[tuple[str, int, bytes], FittedPoints | None] = {}
+        self._curves: dict[bytes, Curves] = {}
+
+    def curve(self, place: Floats, build: Callable[[], Curves]) -> Curves:
+        """The close curve of a ramp whose curve has the places (N + 2, 3) [m]."""
+        key = place.tobytes()
+        if key not in self._curves:
+            self._curves[key] = build()
+        return self._curves[key]
 
     def fit(self, ramp: FittedRamps, curve: Curves, number: int, allowed: float) -> FittedPoints | None:
         """The points of one ramp, approximated at its vertex, from the start ``number`` on, until they are within
