@@ -78,7 +78,7 @@ def closest_points(
 def _turn_nearest(curve: Curves, polygon: Polygons) -> Ints:
     """(S,) the number of the turn of the curve that is nearest to each place of the polygon."""
     turn = curve.turn[0]
-    return np.searchsorted(0.5 * (turn[1:] + turn[:-1]), polygon.parameter[0])
+    return np.asarray(np.searchsorted(0.5 * (turn[1:] + turn[:-1]), polygon.parameter[0]))
 
 
 def _sum_of_largest(curve: Curves, polygon: Polygons, enough: float) -> float:

@@ -304,7 +304,7 @@ def _lengths_beside(fitted: CornerDivision) -> Floats:
 
 def _shortest_beside(fitted: CornerDivision, shortest: Floats) -> Floats:
     """(2, P) of ``shortest`` (N,) [m], of the motions that lead to the points of corners and on from them."""
-    return shortest[fitted.division.source[fitted.motion + np.arange(2)[:, None]]]
+    return np.asarray(shortest[fitted.division.source[fitted.motion + np.arange(2)[:, None]]])
 
 
 def _largest(task: CompensationProblem, fitted: CornerDivision, accepted: Bools) -> Floats:
