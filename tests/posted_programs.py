@@ -96,6 +96,16 @@ def fanuc() -> dict[str, list[str]]:
                     f"G1 X{10 + i}. Y{i}.", f"G3 X{5 + i}. Y{5 + i}. I{5 + i}. J{i}.", f"G1 X{7 + i}.")
             ), *end,
         ],
+        "fanuc-tilted.nc": [
+            *head, "G28 G91 Z0.", "G90", "T1 M6", "S8000 M3", "G54", "G0 B0. C0.", "G68.2 X0. Y0. Z0. I90. J45. K-90.",
+            "G53.1", "G0 X0. Y0.", "G43 Z50. H1", *pocket(), "G69", "G28 G91 Z0.", "G90", "G49", "G0 B0. C0.",
+            "G43 Z50. H1", *pocket(1), *end,
+        ],
+        "fanuc-rotated.nc": [
+            *head, *change, *pocket(1), *(
+                line for k in range(4) for line in (f"G68 X50. Y50. R{k * 90}.", *pocket(1), "G69")
+            ), *end,
+        ],
         "fanuc-rotary-indexed.nc": [
             *head, *change, *pocket(1), "G91 G28 Z0.", "G90 G0 B90.", *change, *pocket(1), "G0 B0.", *pocket(2), *end,
         ],
@@ -123,6 +133,10 @@ def sinumerik() -> dict[str, list[str]]:
         ],
         "840d-swivel.mpf": [
             *head, cycle, *change, *pocket(), swivel, *pocket(1), cycle, "G54", *pocket(2), *end,
+        ],
+        "840d-swivel-cba.mpf": [
+            *head, *change, 'CYCLE800(1,"TC1",200000,27,0,0,0,0,90,0,0,0,0,1,0,0)', *pocket(), "CYCLE800()",
+            "SUPA G0 Z0 D0", 'CYCLE800(0,"0",0,27,0,0,0,0,0,0,0,0,0,1,0,0)', "D1", *pocket(1), *end,
         ],
         "840d-drill.mpf": [
             *head, *change, "G0 X0 Y0", "Z50", "MCALL CYCLE81(50,0,2,-10)", "X10 Y10", "X20", "MCALL", *pocket(),

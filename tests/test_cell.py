@@ -297,6 +297,19 @@ def test_spindle_axes(tmp_path, word, axis):
             "touch_points.2: the 4 points are on one line",
         ),
         ("robot: r\ndialect: {integer_words: inch}\n", "YML004", 2, "not one of mm, um"),
+        ("robot: r\ndialect: {rotary_words: table}\n", "YML004", 2, "not one of tip, part, m428"),
+        (
+            "robot: r\nexternal_axes:\n  E1: {kind: fixed, word: A3}\n",
+            "YML004",
+            3,
+            "no address of a further axis",
+        ),
+        (
+            "robot: r\nexternal_axes:\n  E1: {kind: fixed, word: U}\n  E2: {kind: fixed, word: u}\n",
+            "YML004",
+            3,
+            "U is two axes of the cell",
+        ),
     ],
 )
 def test_mistakes_are_told_with_file_line_and_key(tmp_path, text, code, line, words):

@@ -678,10 +678,12 @@ def test_the_schema_knows_what_the_reader_reads():
             "on": "E2",
         },
         {"kind": "fixed"},
+        {"kind": "fixed", "word": "y2"},
     ]
     for axis in good:
         assert check.is_valid({"robot": "x", "external_axes": {"E1": axis}})
     bad = [{"kind": "track", "limits": [0, 1]}, {"kind": "fixed", "limits": [0, 1]}, {"kind": "rail"}, {}]
+    bad += [{"kind": "fixed", "word": "A3"}, {"kind": "fixed", "word": "Y"}, {"kind": "fixed", "word": ""}]
     bad += [{**good[1], "bases": []}, {**good[1], "bases": [0]}, {**good[0], "direction": "y"}]
     for axis in bad:
         assert not check.is_valid({"robot": "x", "external_axes": {"E1": axis}})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from posted_programs import posted_programs
 from postproc.base.document import Document
 from postproc.languages.dialect import Program, ReadingSettings
 from postproc.languages.gcode import DIALECTS
+from postproc.toolpath import Toolpath
 from postproc.toolpath.initial_state import InitialState
 
 DIALECT = {dialect.name: dialect for dialect in DIALECTS}
@@ -100,7 +102,7 @@ def run(name: str, text: str, **settings: object) -> list[str]:
         ("sinumerik", "MCALL CYCLE81(R1,0,2,-5)\nX1\nMCALL\nG1 X2 Y2\n", ["?*", "?*"]),
         ("sinumerik", "R1=30\nMCALL CYCLE81(R1,0,2,-5)\nX1\nMCALL\nG1 X2\n", ["1 0 30*", "2 0 30"]),
         ("sinumerik", "CYCLE800()\nG1 X1 Y1 Z1\n", ["1 1 1"]),
-        ("sinumerik", 'CYCLE800(1,"",0,57,0,0,0,0,30,0,0,0,0,1)\nG1 X1 Y1 Z1\n', ["?*"]),
+        ("sinumerik", 'CYCLE800(1,"",0,57,0,0,0,0,30,0,0,0,0,1)\nG1 X1 Y1 Z1\n', ["1.36603 1 0.366025"]),
         ("sinumerik", 'CYCLE800(1,"",0,57,0,0,0,0,R1,0,0,0,0,1)\nG1 X1 Y1 Z1\n', ["?*"]),
     ],
 )  # fmt: skip
@@ -199,11 +201,148 @@ def test_blocks_of_one_finding_are_in_the_order_of_the_file():
     assert (found.line, found.message.partition("; ")[2]) == (2, "2 blocks, lines 2 to 5")
 
 
+def test_the_advice_after_a_call_that_is_not_read() -> None:
+    """Its line, where the offset is not known since; followed, an empty subprogram leaves all as it is."""
+
+    def offsets(text: str, **siblings: object) -> list[tuple[str, str]]:
+        found = read("fanuc", text, **siblings).findings
+        return [(one.message, one.help) for one in found if one.code == "GCO014"]
+
+    text = "G65 P8000 X1.\nG1 X1. Y1. Z1.\nX2.\nG54\nG1 X1. Y1. Z1.\nM98 P7\nG1 X1. Y1. Z1.\n"
+    said = "the work offset is not known since line {}, which calls code that is not read"
+    first, second = offsets(text)
+    assert first[0].startswith(said.format(6))
+    assert second[0] == said.format(11)
+    assert "put the file that line 6 calls beside the program, or one with M99 alone" in first[1]
+    empty = tuple(Document(Path(f"O{name}.nc"), f"O{name}\nM99\n".encode()) for name in (8000, 7))
+    assert not offsets(text, siblings=empty)
+    # another cause than the call
+    other = offsets("G65 P8000\nG54\nG1 X1. Y1. Z1.\nG10 L2 P1 X#500\nG1 X1. Y1. Z1.\n")
+    assert [message for message, _ in other] == [
+        "the work offset is not known, or the program itself writes it"
+    ]
+
+
+FURTHER = "G1 X1 Y2 Z3 Y2=-300.4 U5\nG1 X2 Y2=-290\nG1 X3\nG91 G1 X1 U1\n"
+
+
+def test_words_of_external_axes_that_the_cell_states() -> None:
+    """In place of E1 and E2; what is not stated is refused as before, and so is E1 where another word is it."""
+    path = read("sinumerik", FURTHER, external_words={"Y2": 0, "U": 1}).toolpath
+    assert not path.constraints.refused
+    np.testing.assert_array_equal(path.external[1:4, :2], [[-300.4, 5], [-290, 5], [-290, 5]])
+    same = read("sinumerik", FURTHER.replace("Y2=", "E1=").replace("U", "E2=")).toolpath
+    np.testing.assert_array_equal(path.external, same.external)
+    assert {2, 3} <= path.constraints.no_insert_before.keys() | {3}
+    for stated, name in (
+        ({"Y2": 0}, "U (line 5)"),
+        ({"U": 0}, "Y2 (line 5)"),
+        ({}, "U (line 5), Y2 (line 5)"),
+    ):
+        refused = read("sinumerik", FURTHER, external_words=stated).toolpath.constraints.refused
+        assert [found.code for found in refused.values()] == ["GCO026"] * 5
+        assert name in refused[1].message
+    advice = read("sinumerik", FURTHER).toolpath.constraints.refused[1].advice
+    assert "external_axes: {E1: {kind: fixed, word: U}}" in advice
+    moved = read("sinumerik", "G1 X1 E1=5\n", external_words={"Y2": 0}).toolpath.constraints.refused
+    assert "E1 (line 5)" in moved[1].message
+
+
+def test_the_advice_for_the_tool_that_may_be_loaded_at_the_start() -> None:
+    def advice(**initial: object) -> list[str]:
+        text = "G21 G90 G17 G94 F60\nT4 M6\nG1 X1 Y5\nT5 M6\nG1 X6\n"
+        found = read("linuxcnc", text, "", initial=InitialState(**initial)).findings  # type: ignore[arg-type]
+        return [finding.help for finding in found if finding.code == "GCO002"]
+
+    first = (
+        "if tool 4 is loaded where the program starts, state it in the cell: program_start: {tool: 4}; or write Z in"
+        " the first motion after the change"
+    )
+    assert advice() == [first]
+    assert advice(tool=4) == [
+        "state Z under program_start: in the cell, or write them in the first motion",
+        "",
+    ]
+    assert advice(tool=4, words={"Z": 1.0}) == [""]
+    assert advice(tool=3, words={"Z": 1.0}) == [first]
+
+
 def test_the_advice_for_a_reference_point_that_is_not_stated() -> None:
     def advice(text: str) -> list[str]:
         return [finding.help for finding in read("fanuc", text).findings if finding.code == "GCO013"]
 
-    assert advice("G28 B0.\nG1 X1. Y1. Z1.\n") == [
-        "state where G28 leads rotary axes in the cell: symbols: {G28: {B: 0}}"
+    before = "state B under program_start: in the cell, or write B before it"
+    reached = "state where G28 leads rotary axes in the cell: symbols: {G28: {B: 0}}"
+    assert advice("G28 B0.\nG1 X1. Y1. Z1.\n") == [before, reached]
+    assert advice("G28 Z0.\nG30 B0. C0.\nG1 X1. Y1. Z1.\n")[1:] == [
+        "state where G30 leads rotary axes in the cell: symbols: {G30: {B: 0, C: 0}}"
     ]
-    assert advice("G28 Z0.\nG1 X1. Y1. Z1. B5.\n") == [""]
+    turned = advice("G1 X1. Y1. Z1. B5.\n")[1]
+    assert turned.startswith(
+        "state in the cell what A, B, C do: dialect: {rotary_words: part} if they turn the part"
+    )
+
+
+ROTARY = "G0 X0. Y0. Z9. B90. C30.\nG1 Z-1. F100.\nX10. B91.\nG2 X20. I5.\nG81 X5. Z-2. R3.\nG80\nG93 G1 X0. C0. F5.\n"
+
+
+def _columns(path: Toolpath) -> list[np.ndarray]:
+    return [path.position, path.rotation, path.base, path.tool, path.arcs.centre, path.arcs.sweep, path.kind]
+
+
+@pytest.mark.parametrize("name", ["linuxcnc", "fanuc"])
+def test_rotary_words_that_turn_the_part_leave_the_tool_where_it_is(name: str) -> None:
+    """As the cell states it; the tool is where the same program without the words has it, the part is not."""
+    turning = read(name, ROTARY, options={"rotary_words": "part"}).toolpath
+    alone = read(name, re.sub(r" [BC]\d+\.", "", ROTARY)).toolpath
+    for one, other in zip(_columns(turning), _columns(alone), strict=True):
+        np.testing.assert_array_equal(one, other)
+    one, other = (
+        {row: found.code for row, found in path.constraints.refused.items()} for path in (turning, alone)
+    )
+    assert one == other
+    assert len(one) < 3
+    assert not turning.constraints.orientation_programmed.any()
+    # F is that of the axes too where they move, but the time of a block is not
+    moved = np.flatnonzero(np.isnan(turning.feed) & ~np.isnan(alone.feed)).tolist()
+    assert [turning.line[row] for row in moved] == [len(HEAD[name].splitlines()) + 3]
+
+
+@pytest.mark.parametrize("name", ["linuxcnc", "fanuc"])
+def test_rotary_words_at_the_tip_are_those_of_a_tcp_mode(name: str) -> None:
+    stated = read(name, ROTARY, options={"rotary_words": "tip"}).toolpath
+    coded = read(name, "G43.4 H1\n" + ROTARY).toolpath
+    for one, other in zip(_columns(stated), _columns(coded), strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert stated.constraints.orientation_programmed.any()
+    refused = read(name, ROTARY).toolpath.constraints.refused
+    assert len(refused) >= 4
+    # other kinematics in between: what the words mean is not known
+    switched = read(name, ROTARY + "M429\n", options={"rotary_words": "tip"}).toolpath.constraints.refused
+    assert list(switched) == list(refused)
+
+
+@pytest.mark.parametrize(
+    ("text", "known"),
+    [
+        ("M428\n{}", True), ("M428\n{}M429\n", True), ("{}M428\n", False), ("M428\nM429\n{}", False),
+        ("M428\nM430\n{}", False), ("/M428\n{}", False), ("{}", False),
+    ],
+)  # fmt: skip
+def test_codes_that_switch_the_kinematics(text: str, known: bool) -> None:
+    """M428 and M429 of LinuxCNC's configurations with five axes, where the cell states that they are that."""
+    path = read("linuxcnc", text.format(ROTARY), options={"rotary_words": "m428"}).toolpath
+    tip = read("linuxcnc", ROTARY, options={"rotary_words": "tip"}).toolpath
+    plain = read("linuxcnc", ROTARY).toolpath
+    for one, other in zip(_columns(path), _columns(tip if known else plain), strict=True):
+        np.testing.assert_array_equal(one[1:], other[1:])
+    if not known and "M428" in text:
+        assert any("rotary_words: m428" in one.advice for one in path.constraints.refused.values())
+
+
+def test_a_tcp_mode_means_the_same_where_rotary_words_turn_the_part() -> None:
+    text = "G0 B0.\nG43.4 H1\nG1 X5. Y1. Z2. B20.\nG49\n"
+    part, plain = (
+        read("fanuc", text, options=options).toolpath for options in ({"rotary_words": "part"}, {})
+    )
+    np.testing.assert_array_equal(part.rotation[-1], plain.rotation[-1])

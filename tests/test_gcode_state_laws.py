@@ -245,7 +245,8 @@ def course(random: np.random.Generator, n: int) -> AxisWords:
     value = np.round(random.normal(0, 1, (n, 6)), 3)
     value[random.random((n, 6)) < 0.05] = NAN
     lost, left = random.random((n, 6)) < 0.06, random.random((n, 6)) < 0.06
-    return AxisWords(np.where(kind > 0, value, 0.0), kind == 1, kind == 2, lost, left)
+    no = np.zeros(n, np.bool_)
+    return AxisWords(np.where(kind > 0, value, 0.0), kind == 1, kind == 2, lost, left, no, no)
 
 
 def change(block: int, frame: ProgrammedFrame, position: Floats) -> ProgrammedFrame:
@@ -319,7 +320,7 @@ def test_behind_too_many_changes_nothing_is_known(monkeypatch: pytest.MonkeyPatc
         np.arange(1, n),
         lambda *_: ProgrammedFrame(np.eye(3), np.zeros(6)),
     )
-    found = trace.follow(AxisWords(np.ones((n, 6)), all_, none, none, none), 0)
+    found = trace.follow(AxisWords(np.ones((n, 6)), all_, none, none, none, none[:, 0], none[:, 0]), 0)
     assert found.frame.tolist() == [0, 1, 2, 3, 3, 3]
     assert np.isfinite(found.in_base()).all(axis=1).tolist() == [True, True, True, False, False, False]
 

@@ -306,6 +306,27 @@ def test_comments_that_were_meant_as_a_key(read, comment, word):
 
 
 @pytest.mark.parametrize(
+    ("comment", "word"),
+    [
+        ("# tool: 0 0 0.2", "0.2 mm, as if it were in metres"),
+        ("# target M1: 0.3 0 -0.1", "# target M1: its largest coordinate is 0.3 mm"),
+        ("# base_target B: 0 -1.5 0", "1.5 mm, as if it were in metres"),
+        ("# sigma_mm: 20", "20 mm, as if it were in micrometres"),
+    ],
+)
+def test_a_number_in_another_unit_above_the_header(read, comment, word):
+    r = read("# note", comment, "{A},X,Y,Z,TARGET", "{Q},1,2,3,M1")
+    assert told(r)[0] == ("MEA014", 2)
+    assert word in r.findings[0].message
+
+
+@pytest.mark.parametrize("comment", ["# tool: 0 0 0", "# target M1: 0 0 2.5", "# sigma_mm: 2.9"])
+def test_a_number_that_a_robot_has_above_the_header(read, comment):
+    r = read(comment, "{A},X,Y,Z,TARGET", "{Q},1,2,3,M1")
+    assert "MEA014" not in [finding.code for finding in r.findings]
+
+
+@pytest.mark.parametrize(
     "comment",
     [
         "# instrument: GTS3800 laser tracker, 15 um + 6 um/m",

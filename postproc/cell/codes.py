@@ -45,7 +45,7 @@ CODES = define(
         "CEL005": Code(
             "warning",
             "implausible number in the cell",
-            meaning="A frame, an angle or a mass of the cell has a size that only another unit explains.",
+            meaning="A frame, an angle, a mass or a cutter of the cell has a size that only another unit explains.",
             consequence="The robot would be elsewhere, or carry another weight, than the prediction assumes.",
             action="Write lengths in mm, angles in deg and masses in kg.",
             example="`tools: {1: {x: 0.3, y: 0, z: 0.18}}` in metres.",

@@ -24,6 +24,8 @@ TONNES, GRAMS = 0.5, 1000.0
 """[kg] Spindles and tools weigh more than the one and less than the other."""
 LARGE_TOLERANCE, LARGE_ANGLE = 5.0 * MM, 2.0 * DEG
 """Tolerances above these leave nothing to be corrected."""
+THIN = 0.1 * MM
+"""Cutters are thicker."""
 BEHIND, BESIDE = -1.0 * MM, 150.0 * MM
 """A tool centre point behind the flange's face, and nearer to its axis than this, is inside the wrist."""
 POINTS_BACK = -0.5
@@ -106,6 +108,11 @@ def _tool(section: YamlSection, tool: Tool) -> Iterator[Finding]:
     elif tool.mass is not None and tool.mass > GRAMS:
         message = f"no robot carries a tool of {tool.mass:g} kg; is it in grams?"
         yield _finding(section, "CEL005", message, "mass", "masses are in kg")
+    if tool.diameter is not None and tool.diameter < THIN:
+        thin = tool.diameter / MM
+        message = f"no cutter is {thin:g} mm thin; is its diameter in metres?"
+        help = f"lengths are in mm; from metres this is {1000.0 * thin:g}"
+        yield _finding(section, "CEL005", message, "diameter", help)
     if tool.com is not None:
         largest = float(np.abs(tool.com).max()) / MM
         if 0.0 < largest < METRES:

@@ -53,7 +53,8 @@ class Parameter:
     """Name, SI unit, null value (effect absent), bounds, where its definition comes from, and the joint it is of.
 
     ``hardware``: a dimension of built hardware, known from a drawing rather than from how the robot deflects.
-    ``size``: one that is felt, the unit in which fits count; 0 takes that of the SI unit.
+    ``size``: one that is felt, the unit in which fits count; 0 takes that of the SI unit.  ``plausible``: magnitudes
+    between which built hardware has it, if it has it at all.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Parameter:
     joint: str = ""
     hardware: bool = False
     size: float = 0.0
+    plausible: tuple[float, float] = (0.0, math.inf)
 
     @property
     def scale(self) -> float:
@@ -240,10 +242,21 @@ def per_joint(
     upper: float,
     source: str,
     null: float = 0.0,
+    plausible: tuple[float, float] = (0.0, math.inf),
 ) -> tuple[Parameter, ...]:
-    """One parameter a joint, ``letter`` and number; ``units`` of a turning and of a sliding joint."""
+    """One parameter a joint, ``letter`` and number; ``units`` of a turning and of a sliding joint, ``plausible`` of a
+    turning one."""
     return tuple(
-        Parameter(f"{letter}{i}", units[joint.kind != "revolute"], null, lower, upper, source, joint.name)
+        Parameter(
+            f"{letter}{i}",
+            units[joint.kind != "revolute"],
+            null,
+            lower,
+            upper,
+            source,
+            joint.name,
+            plausible=plausible if joint.kind == "revolute" else (0.0, math.inf),
+        )
         for i, joint in enumerate(joints, 1)
     )
 

@@ -30,6 +30,9 @@ from postproc.robot.geometries import Joint
 
 _SOURCE = "Klimchik et al., Fig. 1 and eqs (1)-(4)"
 
+SPRING, LEVER = (1e3, 1e9), (0.01, 10.0)
+"""[N/m], [m] Springs and lengths of built compensators lie between these."""
+
 
 class SpringState(NamedTuple):
     """The spring at joint angles (N,), with its stiffness and rest length.  ``stiffness`` K_c [N/m]; ``rest`` s0 [m];
@@ -93,9 +96,9 @@ class GravityCompensator(EnergyLoad):
         self.zero = zero
         at, along = self.joint_name, "distance of the two ends along the joint axis"
         self.parameters = (
-            Parameter("K_c", "N/m", 0.0, 0.0, 1e9, _SOURCE, at),
-            Parameter("s0", "m", 0.0, 0.0, 10.0, _SOURCE, at, size=0.3),
-            Parameter("L", "m", 0.0, 0.0, 10.0, _SOURCE, at, hardware=True, size=0.3),
+            Parameter("K_c", "N/m", 0.0, 0.0, 1e9, _SOURCE, at, plausible=SPRING),
+            Parameter("s0", "m", 0.0, 0.0, 10.0, _SOURCE, at, size=0.3, plausible=LEVER),
+            Parameter("L", "m", 0.0, 0.0, 10.0, _SOURCE, at, hardware=True, size=0.3, plausible=LEVER),
             Parameter("a_x", "m", 0.0, -10.0, 10.0, _SOURCE, at, hardware=True, size=0.3),
             Parameter("a_y", "m", 0.0, -10.0, 10.0, _SOURCE, at, hardware=True, size=0.3),
             Parameter("h", "m", 0.0, -10.0, 10.0, along, at, hardware=True, size=0.3),

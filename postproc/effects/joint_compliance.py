@@ -9,6 +9,9 @@ from postproc.effects.effect import LinearCompliance, per_joint
 from postproc.robot.chain import Chain
 from postproc.robot.geometries import Joint
 
+PLAUSIBLE = (1e-9, 1e-3)
+"""[rad/(N m)] Stiffer is no drive, and softer no arm that holds a spindle: 1e9 and 1e3 N m/rad."""
+
 
 class JointCompliance(LinearCompliance):
     """theta_i = c_i tau_i, c_i [rad/(N m)] (a sliding joint: [m/N]); zero is a rigid joint.  theta_i adds to the
@@ -25,7 +28,8 @@ class JointCompliance(LinearCompliance):
 
     def __init__(self, joints: Sequence[Joint]) -> None:
         source = "virtual joint model: Klimchik et al., Sec. 3"
-        self.parameters = per_joint(joints, "c", ("rad/(N m)", "m/N"), 0.0, 1e-2, source)
+        units = ("rad/(N m)", "m/N")
+        self.parameters = per_joint(joints, "c", units, 0.0, 1e-2, source, plausible=PLAUSIBLE)
 
     def rows(self, chain: Chain) -> Any:
         return chain.motors

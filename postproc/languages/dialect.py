@@ -79,6 +79,7 @@ class ReadingSettings:
     siblings: files that lie beside the program or above it and say what it does not say itself, read like these.
     symbols: name that only the controller knows (capitals) -> its value, mm and deg where it is a pose; initial: the
     state at the first statement.
+    external_words: address that programs have for an external axis in place of E1 .. E6 (capitals) -> its column.
     places: what only writing needs is wanted too (``Program.text``); a dialect may give None without.
     """
 
@@ -89,6 +90,7 @@ class ReadingSettings:
     symbols: Mapping[str, Symbol] = field(default_factory=dict)
     initial: InitialState = UNSTATED
     places: bool = True
+    external_words: Mapping[str, int] = field(default_factory=dict)
 
 
 PLAIN = ReadingSettings()

@@ -113,5 +113,13 @@ CODES = define(
             action="Give a CSV of readings; `compensate plan` writes one to fill in.",
             example="`compensate diagnose part.src`.",
         ),
+        "MEA014": Code(
+            "warning",
+            "implausible number above the readings",
+            meaning="The tool, a target or the scatter has a size that only another unit explains.",
+            consequence="The measured place, or the weight of the readings, would be wrong.",
+            action="Write lengths in mm.",
+            example="`# target M1: 0.3 0 0.1` in metres.",
+        ),
     }
 )

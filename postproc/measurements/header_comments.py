@@ -19,6 +19,11 @@ KEYS = ("robot", "frame", "tool", "sigma_mm", "sigma_deg", "target", "base_targe
 TARGETS = ("target", "base_target")
 FRAMES = ("tracker", "robot")
 
+METRES = 2.0
+"""[mm] A tool or a target whose largest coordinate is below it was written in metres: none is farther than 2 m."""
+SCATTER = 3.0
+"""[mm] No device that measures a robot scatters by more."""
+
 # the name of a target may hold a colon, numbers do not
 _TARGET = re.compile(r"((?:base_)?target)(\s.*|\s*)[:=]([^:=]*)", re.IGNORECASE)
 _KEYED = re.compile(r"([^:=]*+)[:=]\s*+(.*)")
@@ -91,13 +96,31 @@ def stated_in(table: CsvTable) -> HeaderComments:
     stated = {
         name: "base_target" if name in of_base else "target" for name in lines if of_base.get(name) != ""
     }
+    placed = {("tool", ""): tool[:3]}
+    placed |= {(key, name): numbers(key, (3,), "x y z (mm)", name) for name, key in stated.items()}
+    findings += [
+        _implausible(
+            table,
+            values[key][0],
+            f"# {_title(*key)}: its largest coordinate",
+            max(map(abs, place)),
+            "in metres",
+        )
+        for key, place in placed.items()
+        if place and 0.0 < max(map(abs, place)) < METRES
+    ]
+    if sigma_place is not None and sigma_place > SCATTER * MM:
+        line = values["sigma_mm", ""][0]
+        findings.append(
+            _implausible(table, line, "# sigma_mm: the scatter", sigma_place / MM, "in micrometres")
+        )
     return HeaderComments(
         robot=robot,
         frame=frame,
         tool=Poses.from_abc(np.array(tool[:3]) * MM, np.array(tool[3:] or [0.0] * 3) * DEG) if tool else None,
         sigma=np.nan if sigma_place is None else sigma_place,
         sigma_turn=sigma_turn,
-        places={name: np.array(numbers(key, (3,), "x y z (mm)", name)) * MM for name, key in stated.items()},
+        places={name: np.array(place) * MM for (_, name), place in placed.items() if name},
         on_base=frozenset(of_base),
         lines=lines,
         findings=findings,
@@ -178,6 +201,11 @@ def _numbers(text: str) -> list[float] | None:
 
 def _title(key: str, name: str) -> str:
     return f"{key} {name}".rstrip()
+
+
+def _implausible(table: CsvTable, line: int, what: str, value: float, unit: str) -> Finding:
+    message = f"{what} is {value:g} mm, as if it were {unit}"
+    return Finding("MEA014", message, str(table.path), line, help="lengths are in mm")
 
 
 def _wrong(table: CsvTable, line: int, message: str, help: str = "") -> Refusal:

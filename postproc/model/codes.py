@@ -16,5 +16,13 @@ CODES = define(
             action="Check the parameters, or state `preload: balanced`.",
             example="A torque of 60000 N m on axis 2.",
         ),
+        "MOD004": Code(
+            "warning",
+            "implausible number in the robot file",
+            meaning="A compliance, a spring or a length has a size that built hardware does not have.",
+            consequence="The predicted deflection and its correction would be too large or too small.",
+            action="Check the value and its unit.",
+            example="A joint compliance of 3e-10 rad/(N m).",
+        ),
     }
 )

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import asdict
+
 import numpy as np
 
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses
-from postproc.base.units import DEG
+from postproc.base.units import DEG, MM
 from postproc.effects import Load
 from postproc.model.mechanics import Mechanics
+from postproc.robot.geometries import KukaLengths, KukaVariant
 
 IMPLAUSIBLE_SAG = 0.5 * DEG
 """A joint that its own balancer deflects this far is not balanced: some ten times what weight does to a heavy arm."""
+
+SHORT = 5.0 * MM
+"""The links of an arm that carries a spindle are longer, or have no length."""
 
 
 def find_implausible(model: Mechanics) -> list[Finding]:
@@ -19,7 +26,7 @@ def find_implausible(model: Mechanics) -> list[Finding]:
     limits = model.robot.limits
     angles = np.linspace(limits[:, 0], limits[:, 1], 181)
     state = model.state(angles, np.zeros((len(angles), 6)), Poses.identity())
-    findings = []
+    findings = [*_links(model), *_parameters(model)]
     for term in model.terms:
         if not isinstance(term.effect, Load):
             continue
@@ -41,3 +48,36 @@ def find_implausible(model: Mechanics) -> list[Finding]:
                 )
             )
     return findings
+
+
+def _links(model: Mechanics) -> Iterator[Finding]:
+    """Links that are short as if they were in metres, where mm are stated."""
+    arm = model.robot.nominal
+    lengths = arm.lengths if isinstance(arm, KukaVariant) else arm
+    if not isinstance(lengths, KukaLengths):
+        return
+    for name, length in asdict(lengths).items():
+        if 0.0 < abs(length) < SHORT:
+            message = (
+                f"geometry.kuka.{name} is {length / MM:g} mm; is it in another unit than the other lengths?"
+            )
+            yield Finding("MOD004", message, str(model.robot.path), help="check the length and `unit`")
+
+
+def _parameters(model: Mechanics) -> Iterator[Finding]:
+    """Parameters that built hardware does not have, whatever lies within their intervals."""
+    for index, term in enumerate(model.terms):
+        for parameter in term.effect.parameters:
+            value = abs(term.values[parameter.name])
+            stated = term.stated.get(parameter.name)
+            width = 0.0 if stated is None or stated.interval is None else stated.interval
+            low, high = parameter.plausible
+            if value > 0.0 and (value + width < low or value - width > high):
+                yield Finding(
+                    "MOD004",
+                    f"{model.label(index)}.{parameter.name} is {value:g} {parameter.unit}; built hardware has"
+                    f" {low:g} to {high:g} {parameter.unit}",
+                    str(model.robot.path),
+                    term.line,
+                    help="check the value and its unit",
+                )

@@ -115,5 +115,6 @@ class StiffnessModel(Mechanics):
 
     def plausibility_findings(self) -> list[Finding]:
         """What is implausible about the model itself: a load that, with no force on the tool, deflects a joint by
-        more than ``IMPLAUSIBLE_SAG`` somewhere within its limits (MOD001)."""
+        more than ``IMPLAUSIBLE_SAG`` somewhere within its limits (MOD001); links and parameters that built hardware
+        does not have (MOD004)."""
         return find_implausible(self)

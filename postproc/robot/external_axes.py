@@ -41,7 +41,8 @@ class ExternalAxis:
     along ``direction``) or FIXED (it moves neither).  direction (3,): unit vector, point (3,) [m], both in the world
     with all external axes at zero.  lower, upper, start [mm or deg]; start: where the axis is before a program
     states it, None where nothing states it.  bases: numbers of those that are on a positioner; on: the positioner on
-    which this one is mounted.  line: of the cell file.
+    which this one is mounted.  line: of the cell file.  word: the address that programs in G-code have for it (Y2, U),
+    "" for its name.
     """
 
     name: str
@@ -54,6 +55,7 @@ class ExternalAxis:
     bases: tuple[int, ...] = ()
     on: str | None = None
     line: int = 0
+    word: str = ""
 
     @property
     def column(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,9 +28,9 @@ from postproc.toolpath import COMPUTED, Toolpath
 
 KEY = "external_axes"
 KINDS = {
-    TRACK: ("direction", "limits", "start"),
-    POSITIONER: ("axis", "point", "limits", "start", "bases", "on"),
-    FIXED: (),
+    TRACK: ("direction", "limits", "start", "word"),
+    POSITIONER: ("axis", "point", "limits", "start", "bases", "on", "word"),
+    FIXED: ("word",),
 }
 """Kinds of external axes, and the keys of each."""
 
@@ -38,6 +39,8 @@ DIRECTIONS = {
     for k, letter in enumerate("xyz")
     for sign in "+-"
 }
+WORD = re.compile(r"[UVW]|[XYZUVWQ][1-9][0-9]?")
+"""Addresses that an external axis may have in G-code."""
 SLACK = 1e-6
 """[mm, deg] What a value may be beyond its limit: the rounding of its digits."""
 
@@ -55,6 +58,10 @@ def read_external(top: YamlSection) -> tuple[ExternalAxis, ...]:
     section.only(*NAMES)
     axes = tuple(_axis(section, name) for name in NAMES if name in section)
     _check_stacks(section, {axis.name: axis for axis in axes})
+    words = [axis.word for axis in axes if axis.word]
+    for axis in axes:
+        if words.count(axis.word) > 1:
+            raise section.section(axis.name).error("YML004", f"{axis.word} is two axes of the cell", "word")
     return axes
 
 
@@ -62,8 +69,13 @@ def _axis(section: YamlSection, name: str) -> ExternalAxis:
     given, line = section.section(name), section.line_of(name)
     kind = given.text("kind", choices=tuple(KINDS))
     given.only("kind", *KINDS[kind])
+    word = given.text("word").strip().upper() if "word" in given else ""
+    if word and not WORD.fullmatch(word):
+        raise given.error(
+            "YML004", f"{word!r} is no address of a further axis", "word", "write Y2, U, Q1 ..."
+        )
     if kind == FIXED:
-        return ExternalAxis(name, kind, np.zeros(3), np.zeros(3), -np.inf, np.inf, line=line)
+        return ExternalAxis(name, kind, np.zeros(3), np.zeros(3), -np.inf, np.inf, line=line, word=word)
     unit = "mm" if kind == TRACK else "deg"
     lower, upper = given.numbers("limits", 2, unit=unit)
     if not lower < upper:
@@ -75,12 +87,13 @@ def _axis(section: YamlSection, name: str) -> ExternalAxis:
         )
     if kind == TRACK:
         return ExternalAxis(
-            name, kind, _direction(given, "direction"), np.zeros(3), lower, upper, start, line=line
+            name, kind, _direction(given, "direction"), np.zeros(3), lower, upper, start, line=line, word=word
         )
     point = frozen(np.array(given.numbers("point", 3, unit="mm")) * MM, (3,))
     bases = _bases(given) if "bases" in given else ()
     on = given.text("on", choices=NAMES) if "on" in given else None
-    return ExternalAxis(name, kind, _direction(given, "axis"), point, lower, upper, start, bases, on, line)
+    direction = _direction(given, "axis")
+    return ExternalAxis(name, kind, direction, point, lower, upper, start, bases, on, line, word)
 
 
 def _direction(section: YamlSection, key: str) -> Floats:

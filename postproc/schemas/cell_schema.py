@@ -57,6 +57,11 @@ _DIRECTION: Schema = {
     "anyOf": [text(choices=[*DIRECTIONS, *(word.upper() for word in DIRECTIONS)]), numbers(3, 3)]
 }
 
+_ADDRESS: Schema = {
+    "type": "string",
+    "pattern": "^(?:[UVWuvw]|[XYZUVWQxyzuvwq][1-9][0-9]?)$",
+    "description": "its address in programs for a Sinumerik, where that is not its name",
+}
 _EXTERNAL: Schema = {
     "oneOf": [
         mapping(
@@ -65,6 +70,7 @@ _EXTERNAL: Schema = {
                 "direction": {**_DIRECTION, "description": "in which the axis moves the robot, world axes"},
                 "limits": numbers(2, 2, "mm"),
                 "start": number("value before a program states one, mm"),
+                "word": _ADDRESS,
             },
             ["kind", "direction", "limits"],
         ),
@@ -80,10 +86,11 @@ _EXTERNAL: Schema = {
                 "start": number("value before a program states one, deg"),
                 "bases": {"type": "array", "items": {"type": "integer", "minimum": 1}, "minItems": 1},
                 "on": text("the positioner that carries it", NAMES),
+                "word": _ADDRESS,
             },
             ["kind", "axis", "point", "limits"],
         ),
-        mapping({"kind": {"const": FIXED}}, ["kind"], "it moves neither robot nor part"),
+        mapping({"kind": {"const": FIXED}, "word": _ADDRESS}, ["kind"], "it moves neither robot nor part"),
     ]
 }
 

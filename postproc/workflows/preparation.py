@@ -142,7 +142,8 @@ def read_program(
     settings = ReadingSettings(references=references)
     if cell is not None:
         stated = cell.orientation, cell.dialect_options, references, (), cell.symbols, cell.program_start
-        settings = ReadingSettings(*stated)
+        words = {axis.word: axis.column for axis in cell.external_axes if axis.word}
+        settings = ReadingSettings(*stated, external_words=words)
     program, settings = read_with_siblings(dialect, documents, settings, beside)
     if not len(program.toolpath) and cell is not None and cell.dialect is not None:
         _refuse_other_language(path, main.raw, dialect, cell)

@@ -106,13 +106,7 @@ class BlockWords:
         codes = self.words(key("G")).value
         if np.isin(codes, (90.1, 91.1)).any():
             return None
-        absolute = everywhere(1, len(self), np.int8)
-        modal = replace(
-            self.modal,
-            force={**self.modal.force, Group.ARCS: absolute},
-            ahead={**self.modal.ahead, Group.ARCS: 1},
-        )
-        return replace(self, modal=modal)
+        return replace(self, modal=self.modal.with_value(Group.ARCS, 1))
 
     def part(self, start: int, stop: int) -> BlockWords:
         """The blocks start .. stop - 1 of a whole program."""
@@ -394,10 +388,15 @@ def frame_events(
         if force[group].any() or modal.ahead[group]:
             lose(whole, (force[group] != 0) & words.motion, What.FRAME)
             leave(whole, modal.switched(group), What.FRAME)
+    if force[Group.PLACED].any() or modal.ahead[Group.PLACED]:
+        leave(linear, modal.switched(Group.PLACED) | (modal.has(Once.FRAME) & words.control.iso), What.FRAME)
     # With the rotary axes at 0 the words mean the same with and without a TCP mode.
     leave(linear, modal.switched(Group.TCP) & away, What.TIP)
     if lengths.any():
         # Along the tool, which only rotary axes away from 0 can lay elsewhere than along Z.
         leave(np.arange(6) == 2, lengths, What.LENGTH)
         leave(linear, lengths & away, What.LENGTH)
-    return AxisWords(np.where(target, value, 0.0), target & ~relative, relative, lost, left)
+    by_machine = words.motion & modal.has(Once.HOME, Once.MACHINE)
+    return AxisWords(
+        np.where(target, value, 0.0), target & ~relative, relative, lost, left, by_machine, lengths
+    )

@@ -6,6 +6,7 @@ import math
 
 from postproc.languages.gcode import expression_values, general_lines, offsets
 from postproc.languages.gcode.control import UNKNOWN, Control, Feed, Group, ModalCode, Move, Once, modal_codes
+from postproc.languages.gcode.tilted_planes import with_planes
 
 COMMENT = rb"\((?:[^()\r\n]++|\([^()\r\n]*+\))*+\)?|;[^\r\n]*"
 """Parentheses, one pair of which may hold others; or from a semicolon on."""
@@ -140,7 +141,12 @@ FANUC = Control(
     line=general_lines.line,
     comment=END_OF_BLOCK,
     iso=True,
-    also={**_TIP, **_ARGUMENTS},
+    also={
+        **_TIP,
+        **_ARGUMENTS,
+        **dict.fromkeys((680, 682), (ModalCode(Group.PLACED, 1),)),
+        **dict.fromkeys((690, 691), (ModalCode(Group.TURNED, 0),)),
+    },
     codes={
         **_COMMON,
         **modal_codes(
@@ -166,11 +172,13 @@ FANUC = Control(
                 (Group.DIAMETER, 1, (10.9,)),
                 (Group.FOREIGN, 1, (7, 51.2, 54.2, 54.4)),
                 (Group.FOREIGN, 1, (7.1, 107, 112, 12.1)),
+                (Group.ONCE, Once.FRAME, (68, 68.2, 53.1)),
+                (Group.PLACED, 0, (69, 69.1)),
                 (Group.FOREIGN, 0, (113, 13.1)),  # G113 only where such a mode is in force, see modal
             )
         ),
     },
-    frame=offsets.two_shifts,
+    frame=with_planes(offsets.two_shifts),
     cycle_apart=True,
     increments=True,
     turns=(0, 0),

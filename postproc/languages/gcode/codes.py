@@ -62,8 +62,9 @@ CODES = define(
             meaning="The called code may move the machine and change modes.",
             consequence="Position and modes are unknown after it until they are set again.",
             action=(
-                "Put the file of the subprogram (POCKET.SPF, O1000.nc) beside the program; or write its blocks in "
-                "place of the call; or set modes and X, Y, Z after it."
+                "Put the file of the subprogram (POCKET.SPF, O1000.nc) beside the program, or one with M99 alone if it "
+                "moves and changes nothing; or write its blocks in place of the call; or set modes and X, Y, Z after "
+                "it."
             ),
             example="`M98 P1000`.",
         ),
@@ -96,7 +97,7 @@ CODES = define(
             meaning="The coordinates are rotated, scaled, mirrored, polar, or diameters.",
             consequence="Their place in the base is not followed, so the motion is not corrected.",
             action="Let the post-processor write coordinates of the base itself.",
-            example="`G68 X0 Y0 R30`.",
+            example="`G51.1 X0`.",
         ),
         "GCO011": Code(
             "info",
@@ -117,13 +118,16 @@ CODES = define(
         "GCO013": Code(
             "warning",
             "rotary axes without a TCP mode",
-            meaning="The rotary axes are not at 0, and no TCP mode such as G43.4 is active.",
+            meaning=(
+                "The rotary axes are not at 0, or not known, and no TCP mode such as G43.4 is active; or they are not "
+                "known under one."
+            ),
             consequence=(
                 "The place of the tool depends on the machine's geometry, so the motion is not corrected."
             ),
             action=(
-                "Let the post-processor write tip coordinates (G43.4), or all motions with the rotary "
-                "axes at 0."
+                "Let the post-processor write tip coordinates (G43.4), or all motions with the rotary axes at 0; or "
+                "state in the cell what the rotary words do (dialect: {rotary_words: part} or tip)."
             ),
             example="`G1 X10 B30` without G43.4.",
         ),
@@ -243,7 +247,8 @@ CODES = define(
                 "motions are not corrected."
             ),
             action=(
-                "Let the post-processor name what carries robot or part E1 to E6, and declare it in the cell."
+                "State in the cell what carries robot or part, and which word names it (external_axes: with word:); or "
+                "let the post-processor name it E1 to E6."
             ),
             example="`G1 X10 W50`.",
         ),
@@ -306,6 +311,17 @@ CODES = define(
             consequence="It is not corrected, as only the program itself is written.",
             action="Put the subprogram into the file of the program, or correct its file by itself.",
             example="`M98 P1234` with O1234.nc beside the program.",
+        ),
+        "GCO034": Code(
+            "info",
+            "tool along a plane that the program states",
+            meaning=(
+                "G53.1 and CYCLE800 bring the tool along the normal of the plane; how far it then turns about its own "
+                "axis is the machine's. It is taken as turned from the cell's orientation on the shortest way."
+            ),
+            consequence="Another turn about the tool's axis is another pose of the arm, and another correction.",
+            action="Check in a simulation that the robot holds the tool so.",
+            example="`G68.2 X0 Y0 Z0 I0 J30 K0` and `G53.1`.",
         ),
         "SIN001": Code(
             "info",

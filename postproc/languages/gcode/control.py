@@ -47,6 +47,7 @@ class Group(IntEnum):
     OFFSETS = 27  # 0; else an offset of the tool's length that the program adds (TOFFL)
     OVERRIDE = 28  # 0; else F is not the feed (OVR)
     FEED_AXES = 29  # 0 F is that of X, Y, Z; else of other axes too, or not of all (FGROUP)
+    PLACED = 30  # 0; else coordinates are those of a plane that the program states (G68, G68.2 of a Fanuc)
     EULER = 40  # what A2= B2= C2= are: 0 Euler angles (Z X' Z''), 1 RPY angles (Z Y' X'')
 
 
@@ -135,16 +136,27 @@ class LexedLine(NamedTuple):
     deleted: bool
 
 
+class ToolAxis(IntEnum):
+    """Where the tool points in a frame, outside of TCP modes."""
+
+    STATED = 0  # as the cell and the words of rotary axes state it
+    NORMAL = 1  # along the z axis of the frame
+    UNKNOWN = 2  # along a frame that is no longer in force, unless words of rotary axes state it
+
+
 @dataclass(frozen=True, eq=False)
 class ProgrammedFrame:
     """Programmed coordinates in the base: base = turn @ xyz + shift[:3], and abc + shift[3:] for the rotary axes.
 
-    turn (3, 3); shift (6,) [m, rad], NaN where not known; memory: what the control itself remembers.
+    turn (3, 3); shift (6,) [m, rad], NaN where not known; memory: what the control itself remembers.  rotary (3,)
+    [rad]: where the block that starts it leaves the rotary axes, NaN where not known; None where they stay.
     """
 
     turn: Floats
     shift: Floats
     memory: Any = None
+    tool: ToolAxis = ToolAxis.STATED
+    rotary: Floats | None = None
 
     def to_base(self, programmed: Floats) -> Floats:
         """(..., 6) [m, rad] of ``programmed`` (..., 6) in the base."""
@@ -168,7 +180,9 @@ def either_frame(one: ProgrammedFrame, other: ProgrammedFrame) -> ProgrammedFram
     """What is known where one of two frames is in force, ``other`` after a block that may run: what both have."""
     same = (one.shift == other.shift) & np.array_equal(one.turn, other.turn)
     memory = _either_memory(one.memory, other.memory)
-    return ProgrammedFrame(other.turn, np.where(same, one.shift, np.nan), memory)
+    tool = one.tool if one.tool == other.tool else ToolAxis.UNKNOWN
+    rotary = None if other.rotary is None else np.full(3, np.nan)
+    return ProgrammedFrame(other.turn, np.where(same, one.shift, np.nan), memory, tool, rotary)
 
 
 def _either_memory(one: Any, other: Any) -> Any:
@@ -176,7 +190,7 @@ def _either_memory(one: Any, other: Any) -> Any:
         before = one or {}
         return {name: value if before.get(name) == value else (np.nan,) * 6 for name, value in other.items()}
     if isinstance(other, np.ndarray):
-        return np.where(other == (np.nan if one is None else one), other, np.nan)
+        return np.where(other == (one if isinstance(one, np.ndarray) else np.nan), other, np.nan)
     return one if other is None else other
 
 
@@ -184,8 +198,8 @@ def _either_memory(one: Any, other: Any) -> Any:
 class Event:
     """A block that changes the frame: its words (key -> value as written, NaN if UNREAD), its Once bits, its notes.
 
-    plane: 0, 1, 2 for G17, G18, G19; scale [m]: one unit of length; frame: before the block; position (6,) [m, rad]:
-    where the tool is, in the base.
+    plane: 0, 1, 2 for G17, G18, G19; absolute: under G90; scale [m]: one unit of length; frame: before the block;
+    position (6,) [m, rad]: where the tool is, in the base.
     """
 
     words: Mapping[int, float]
@@ -196,6 +210,7 @@ class Event:
     scale: float
     frame: ProgrammedFrame
     position: Floats
+    absolute: bool = True
 
 
 def keep_frame(event: Event) -> ProgrammedFrame:

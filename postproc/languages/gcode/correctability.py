@@ -17,8 +17,10 @@ from postproc.languages.gcode.execution import Execution
 from postproc.languages.gcode.execution_flow import FlowReason
 from postproc.languages.gcode.feeds import feeds_before_units
 from postproc.languages.gcode.motions import GcodeMotions
+from postproc.languages.gcode.numbered import TOOL_CHANGE
 from postproc.languages.gcode.positions import Positions
 from postproc.languages.gcode.refusals import RefusalCollector, RefusalReason, Refusals
+from postproc.languages.gcode.rotary_refusals import refuse_rotary
 from postproc.languages.gcode.words import How, key
 from postproc.toolpath import Kind
 
@@ -63,6 +65,10 @@ class Built:
 
 
 _WRITE = "write them in the first motion"
+_LOADED = (
+    "if tool {0} is loaded where the program starts, state it in the cell: program_start: {{tool: {0}}}; or write {1}"
+    " in the first motion after the change"
+)
 NUMBERS = (*AXES, *(key(letter) for letter in "IJKR"))
 
 
@@ -155,10 +161,11 @@ def check_correctability(
         "the work offset of this rapid is not known, or the program itself writes it",
     )
     refuse(air & (tool < 0), "GCO003", "this rapid has no tool, or its number or length is not known")
+    _offsets_lost(words, rows[(base < 0) & ~air], np.flatnonzero((base < 0) & ~air), collector)
     refuse(base < 0, "GCO014", "the work offset is not known, or the program itself writes it")
     refuse(tool < 0, "GCO015", "no tool is loaded, or its number or length is not known")
     refuse(force[Group.UNITS] < 0, "GCO002", "mm or inch is not known")
-    _positions(words, moves, where, collector, reasons)
+    _positions(words, moves, where, tool, collector, reasons)
     for wrong, message in ARCS.items():
         refuse(moves.arcs.wrong == wrong, "GCO012", message)
     refuse(moves.arcs.wrong == 1, "GCO012", "the start of the arc is not known")
@@ -168,13 +175,31 @@ def check_correctability(
         "GCO012",
         "it is not known whether I J K are coordinates or differences",
     )
-    led = (modal.has(Once.HOME) & (words.has(*AXES[3:]) | ~words.axis)).any() and words.control.iso
-    reference = "state where G28 leads rotary axes in the cell: symbols: {G28: {B: 0}}" if led else ""
-    for wrong, message in (
-        (1, "a rotary axis is not at 0, or not known, and no TCP mode is active"),
-        (2, "a rotary axis that the program uses is not set yet"),
-    ):
-        refuse(moves.tool_orientation.wrong == wrong, "GCO013", message, reference)
+    refuse_rotary(words, moves, where, reasons, collector)
+
+
+def _offsets_lost(words: BlockWords, blocks: Ints, rows: Ints, collector: RefusalCollector) -> None:
+    """Refuses motions ``rows`` (K,) in ``blocks`` (K,) whose work offset is not known since a call that is not read."""
+    calls = np.flatnonzero(words.modal.flow.forget)
+    at = np.searchsorted(calls, blocks, side="right") - 1
+    if not (at >= 0).any():
+        return
+    known = np.where(words.modal.force[Group.OFFSET] >= 0, np.arange(len(words)), -1)
+    some = (at >= 0) & (np.maximum.accumulate(known)[blocks] < calls[at])
+    lines = words.source.blocks.line
+    if not some.any():
+        return
+    which, number = np.unique(at[some], return_inverse=True)
+    reasons = []
+    for call in calls[which].tolist():
+        line = lines[words.start + call - 1]
+        message = f"the work offset is not known since line {line}, which calls code that is not read"
+        help_ = (
+            f"put the file that line {line} calls beside the program, or one with M99 alone if it moves and changes"
+            " nothing; or select the offset again after it (G54)"
+        )
+        reasons.append(RefusalReason("GCO014", message, f"call {line}", help_))
+    collector.refuse_each(rows[some], reasons, number.reshape(-1))
 
 
 def _is_arc(move: Ints) -> Bools:
@@ -198,9 +223,14 @@ def code_name(value: float) -> str:
 
 
 def _positions(
-    words: BlockWords, moves: GcodeMotions, where: Positions, collector: RefusalCollector, reasons: Reasons
+    words: BlockWords,
+    moves: GcodeMotions,
+    where: Positions,
+    tool: Ints,
+    collector: RefusalCollector,
+    reasons: Reasons,
 ) -> None:
-    """Refuses motions whose end is not known, by what left it unknown."""
+    """Refuses motions whose end is not known, by what left it unknown; tool (N,): numbers."""
     rows = moves.block
     lost = np.isnan(moves.end[:, :3])
     frame = np.isnan(moves.place) & ~lost
@@ -213,7 +243,10 @@ def _positions(
         keys = np.stack([causes, missing, air], axis=1)
         kinds, which = np.unique(keys, axis=0, return_inverse=True)
         messages = []
-        for cause, bits, rapid in kinds.tolist():
+        changes = words.source.column(key("M"))
+        loading = changes.block[changes.value == TOOL_CHANGE][:1]
+        first_change = int(loading[0]) if len(loading) and words.control.keeps_length else -1
+        for kind, (cause, bits, rapid) in enumerate(kinds.tolist()):
             names = ", ".join(name for name, bit in (("X", 4), ("Y", 2), ("Z", 1)) if bits & bit)
             why = (
                 "is never set before"
@@ -225,6 +258,9 @@ def _positions(
                 what = What.ORIGIN
             message = f"{names}: {why}{f' ({what})' if what else ''}"
             help_ = f"state {names} under program_start: in the cell, or {_WRITE}" if cause < 0 else ""
+            if what == What.LENGTH and cause == first_change:
+                loaded = int(tool[some[which.reshape(-1) == kind][0]])
+                help_ = _LOADED.format(loaded, names) if loaded > 0 else ""
             messages.append(RefusalReason("GCO003" if rapid else "GCO002", message, what, help_))
         collector.refuse_each(some, messages, which.reshape(-1))
     collector.refuse(

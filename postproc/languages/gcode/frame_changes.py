@@ -15,11 +15,17 @@ from postproc.languages.gcode.control import Event, Group, Once, ProgrammedFrame
 from postproc.languages.gcode.lexing import FARTHEST
 from postproc.languages.gcode.words import How, Note, key
 
+_ANGLES = tuple(key(letter) for letter in "IJKR")
+"""Words of planes (G68, G68.2) that are angles."""
+
 
 def frame_blocks(words: BlockWords) -> Ints:
     """(K,) the blocks that change the frame: G92 and G52 only with coordinates."""
     mentioned = words.has(*(key(letter) for letter in "XYZABC"))
     always = words.modal.has(Once.UNSHIFT, Once.SUSPEND, Once.RESTORE, Once.FRAME)
+    placed = words.modal.force[Group.PLACED]
+    if placed.any():
+        always |= words.modal.switched(Group.PLACED) | (words.modal.switched(Group.OFFSET) & (placed != 0))
     return np.flatnonzero(
         (always | (words.modal.has(Once.SHIFT, Once.LOCAL) & mentioned)) & words.modal.flow.tape
     )
@@ -42,14 +48,14 @@ def frame_change(
         here = block_words.part(block, block + 1)
         lengths = float(here.length_of_integer[0] / here.length[0])
         angles = SMALL_ANGLE if block_words.integers.increments else 1.0
-        small = {one: angles if one in AXES[3:] else lengths for one in keys}
+        small = {one: angles if one in (*AXES[3:], *_ANGLES) else lengths for one in keys}
         words = {
             one: float(column.value[-1] * (small[one] if column.how[-1] == How.INTEGER else 1.0))
             for one in keys
             if len(column := here.words(one))
         }
         if here.ambiguous.any():
-            words = {one: math.nan if one in AXES[:3] else value for one, value in words.items()}
+            words = {one: math.nan if one in (*AXES[:3], *_ANGLES) else value for one, value in words.items()}
         codes = tuple(here.words(key("G")).value.tolist())
         event = Event(
             words,
@@ -60,6 +66,7 @@ def frame_change(
             float(here.length[0]),
             frame,
             position,
+            int(here.modal.force[Group.DISTANCE][0]) == 0,
         )
         after = change(event)
         after = replace(after, shift=np.where(np.abs(after.shift) > FARTHEST * MM, np.nan, after.shift))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,7 +13,7 @@ from postproc.languages.gcode.certain_flow import follow
 from postproc.languages.gcode.control import UNKNOWN, Control, Group, ModalCode, Move, Once
 from postproc.languages.gcode.execution import Execution
 from postproc.languages.gcode.execution_flow import ExecutionFlow, FlowReason
-from postproc.languages.gcode.modal_fill import fill_modal, switched
+from postproc.languages.gcode.modal_fill import everywhere, fill_modal, switched
 from postproc.languages.gcode.source import Source, WordColumn
 from postproc.languages.gcode.words import key
 
@@ -88,6 +88,14 @@ class Modal:
         mask = np.zeros(len(self.once), np.bool_)
         mask[self.unknown_codes.block] = True
         return mask
+
+    def with_value(self, group: Group, value: int) -> Modal:
+        """The same with ``value`` of ``group`` in force all along."""
+        return self.with_values(group, everywhere(value, len(self.once), np.int8), value)
+
+    def with_values(self, group: Group, values: Ints, ahead: int) -> Modal:
+        """The same with ``values`` (B,) of ``group`` in force, ``ahead`` ahead of the first block."""
+        return replace(self, force={**self.force, group: values}, ahead={**self.ahead, group: ahead})
 
     def switched(self, group: Group) -> Bools:
         """(B,) blocks in which another value is in force than in the block ahead."""

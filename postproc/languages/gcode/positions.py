@@ -13,8 +13,9 @@ from itertools import pairwise
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
-from postproc.languages.gcode.control import ProgrammedFrame
+from postproc.languages.gcode.control import ProgrammedFrame, ToolAxis
 
+_LINEAR = np.arange(6) < 3
 MOST = 2000
 """Changes of the frame that are followed; after them nothing is known."""
 
@@ -24,7 +25,8 @@ class AxisWords:
     """What the blocks do to the coordinates X, Y, Z, A, B, C, each (B, 6).
 
     value (B, 6) [m, rad]; sets (B, 6): it is a coordinate; adds (B, 6): a difference; unknown (B, 6): lost after the
-    block; unknown_before (B, 6): unknown already before it.
+    block; unknown_before (B, 6): unknown already before it.  by_machine (B,): it moves along axes of the machine;
+    by_length (B,): another tool length holds from it on.
     """
 
     value: Floats
@@ -32,6 +34,8 @@ class AxisWords:
     adds: Bools
     unknown: Bools
     unknown_before: Bools
+    by_machine: Bools
+    by_length: Bools
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +82,10 @@ class Trace:
         """Rows (K,) in ``frames`` of blocks (K,) that were followed."""
         return np.searchsorted(self._events, blocks, side="right").astype(np.int16)
 
+    def started(self, frames: Ints) -> Ints:
+        """The blocks (K,) that start the frames of rows ``frames`` (K,) in ``frames``; 0 of the first."""
+        return np.append(0, self._events)[frames]
+
     def follow(self, axis_words: AxisWords, start: int) -> Positions:
         """The next blocks, of which ``start`` is the first."""
         n = len(axis_words.value)
@@ -108,12 +116,14 @@ class Trace:
             frame = ProgrammedFrame(np.eye(3), np.full(6, np.nan))
         self.frames.append(frame)
         self._here = frame.from_base(there)
+        if frame.rotary is not None:
+            self._here[3:] = frame.rotary
         self._origin = np.where(np.isnan(self._here), event, self._origin)
 
     def _scan(self, axis_words: AxisWords, piece: slice, first: int, positions: Positions) -> None:
         if piece.stop > piece.start:
             positions.start[piece], positions.end[piece], positions.source[piece] = _scan(
-                axis_words, piece, self._here, self._origin, first
+                axis_words, piece, self._here, self._origin, first, self.frames[-1]
             )
             self._here, self._origin = (
                 positions.end[piece.stop - 1].copy(),
@@ -122,13 +132,16 @@ class Trace:
 
 
 def _scan(
-    axis_words: AxisWords, piece: slice, here: Floats, origin: Ints, first: int
+    axis_words: AxisWords, piece: slice, here: Floats, origin: Ints, first: int, frame: ProgrammedFrame
 ) -> tuple[Floats, Floats, Ints]:
     value, sets, adds = axis_words.value[piece], axis_words.sets[piece], axis_words.adds[piece]
-    lost, unknown_before = (
-        axis_words.unknown[piece],
-        axis_words.unknown_before[piece] & ~axis_words.sets[piece],
-    )
+    lost, left = axis_words.unknown[piece], axis_words.unknown_before[piece]
+    if not np.array_equal(frame.turn, np.eye(3)):
+        # what moves along one axis of the machine, or of the tool, moves along several of the frame
+        lost = lost | (axis_words.by_machine[piece][:, None] & _LINEAR)
+        if frame.tool != ToolAxis.NORMAL and frame.turn[2, 2] != 1.0:
+            left = left | (axis_words.by_length[piece][:, None] & _LINEAR)
+    unknown_before = left & ~sets
     gone = lost | unknown_before | (adds & np.isnan(value))
     anchor = sets | gone
     n = len(value)
@@ -140,5 +153,5 @@ def _scan(
     end = np.where(where >= 0, known[row, column] + (total - total[row, column]), here + total)
     source = np.where(where >= 0, where + (first + piece.start), origin)
     start = np.concatenate([here[None], end[:-1]])
-    start[axis_words.unknown_before[piece]] = np.nan
+    start[left] = np.nan
     return start, end, source

@@ -18,13 +18,14 @@ from postproc.languages.dialect import PLAIN, Program, ReadingSettings
 from postproc.languages.gcode import offsets
 from postproc.languages.gcode.block_arcs import arcs_of_blocks, given_by_point
 from postproc.languages.gcode.blocks import (
+    AXES,
     BlockWords,
     Reasons,
     blocks,
     frame_events,
     tilted,
 )
-from postproc.languages.gcode.cell_options import INTEGER_WORDS
+from postproc.languages.gcode.cell_options import INTEGER_WORDS, ROTARY_WORDS, TURN_PART
 from postproc.languages.gcode.comments import remarks
 from postproc.languages.gcode.control import (
     Control,
@@ -32,6 +33,7 @@ from postproc.languages.gcode.control import (
     Group,
     Move,
     Once,
+    ToolAxis,
 )
 from postproc.languages.gcode.correctability import (
     Built,
@@ -50,7 +52,7 @@ from postproc.languages.gcode.drill_cycles import (
     with_holes,
 )
 from postproc.languages.gcode.execution import FoldedWords, execute
-from postproc.languages.gcode.external_axes import external_axes, moves_external, others_move
+from postproc.languages.gcode.external_axes import addresses, external_axes, moves_external, others_move
 from postproc.languages.gcode.feeds import Feeds, blend_tolerances, blends, with_stops
 from postproc.languages.gcode.frame_changes import frame_blocks, frame_change
 from postproc.languages.gcode.integer_words import integer_words
@@ -63,6 +65,7 @@ from postproc.languages.gcode.positions import Positions, Trace
 from postproc.languages.gcode.reference_points import reference_angles
 from postproc.languages.gcode.refusals import RefusalCollector
 from postproc.languages.gcode.source_map import STATE, FoldedNumbers, GcodeSourceMap
+from postproc.languages.gcode.stated_kinematics import with_stated_kinematics
 from postproc.languages.gcode.subprogram_files import JoinedText, file_name, join
 from postproc.languages.gcode.tool_orientation import ToolOrientations
 from postproc.languages.gcode.words import key
@@ -94,7 +97,9 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     offsets_in_text = execution.source.blocks.start
     source, foreign = joined.at_the_calls(execution.source)
     execution = replace(execution, source=source)
-    given = blocks(source, modal(execution, control, settings.initial.base), control, integers)
+    in_force = modal(execution, control, settings.initial.base)
+    in_force = with_stated_kinematics(source, in_force, settings.options.get(ROTARY_WORDS, ""))
+    given = blocks(source, in_force, control, integers)
     rows = np.flatnonzero(given.motion).astype(np.int32)
     offset = work_offsets(given)
     base = offset.base[rows]
@@ -126,11 +131,16 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     )
     lines = source.blocks
     line, start = lines.line[rows], lines.start[rows]
-    external = external_axes(given, rows)
-    if control.further and (others := others_move(given)).any():
-        where = int(lines.line[np.argmax(others)])
-        message = f"an axis that is none of X, Y, Z, E1 to E6 and the rotary ones moves (line {where})"
-        collector.refuse(np.ones(len(rows), np.bool_), "GCO026", message)
+    axes = addresses(settings.external_words if control.further else {})
+    external = external_axes(given, rows, axes)
+    if control.further and (others := others_move(given, axes)):
+        moving = ", ".join(f"{name} (line {lines.line[block]})" for name, block in sorted(others.items())[:6])
+        message = f"axes move that are none of X, Y, Z, E1 to E6 and the rotary ones: {moving}"
+        first = min((name for name in others if name[0] not in "ABCE"), default="")
+        stated = f"external_axes: {{E1: {{kind: fixed, word: {first}}}}}"
+        help_ = f"state in the cell what they carry: {stated} where it moves neither robot nor part; or kind: track"
+        help_ = help_ if first else ""
+        collector.refuse(np.ones(len(rows), np.bool_), "GCO026", message, help_)
     refused = collector.done(document, line, start, lines.first[rows])
     frame_of_base, frame_of_tool, cell_frames = references(base, tool[rows], line, offset.stated)
     said = remarks(document, source, rows, execution.order is None, foreign)
@@ -183,6 +193,10 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         *refused.findings(),
         *diagnostics(document, given, rows, tool, named, settings),
     ]
+    if run.along_plane >= 0:
+        message = "the tool is taken as turned to the normal of the plane on the shortest way"
+        at = int(lines.line[run.along_plane])
+        findings.append(Finding("GCO034", message, str(document.path), at, 1))
     if coordinates:
         message = "I J K are read as coordinates: only so the radii of the arcs agree"
         arc = np.flatnonzero(built.kind == Kind.CIRC)[:1]
@@ -239,7 +253,7 @@ def _folded(words: FoldedWords, rows: Ints) -> FoldedNumbers:
 class FollowedMotions(NamedTuple):
     """The motions' columns, what others build on, the frames of the program, what its orientation words mean, and why
     motions are refused; differing_radii: arcs whose radii at start and end differ; levels (K,): blocks that state the
-    level to which a drill cycle goes back."""
+    level to which a drill cycle goes back; along_plane: the first block that brings the tool along a plane, -1."""
 
     columns: FilledRows
     built: Built
@@ -248,6 +262,7 @@ class FollowedMotions(NamedTuple):
     collector: RefusalCollector
     differing_radii: int
     levels: Ints
+    along_plane: int
 
 
 def _followed(
@@ -266,7 +281,7 @@ def _followed(
     trace = Trace(offsets.start(), events, frame_change(words, events), _start(settings))
     feeds, tool_orientations, away, reasons = (
         Feeds(words),
-        ToolOrientations(words, turned),
+        ToolOrientations(words, turned, settings.options.get(ROTARY_WORDS) == TURN_PART),
         tilted(words),
         Reasons(len(words)),
     )
@@ -299,7 +314,7 @@ def _followed(
         check_correctability(here, moves, where, base[low:high], tool[rows[low:high]], reasons, unbound, part)
         found.put(
             high - low,
-            **_columns(here, where, moves, feeds),
+            **_columns(here, where, moves, feeds, tool_orientations.turn_part),
             blend=np.where(np.isfinite(moves.room), 0.0, blends(here, own, allowed)),
             sets=stated_coordinates(ends.stated(way.sets[own, :3], rows[low:high]), moves, holes),
             lost=way.unknown[own, :3],
@@ -310,15 +325,23 @@ def _followed(
         np.array([frame.shift[:3] for frame in trace.frames]),
     )
     levels = np.unique(ends.source[np.isfinite(drills.depth) & (ends.source >= 0)])
+    along = [number for number, frame in enumerate(trace.frames) if frame.tool == ToolAxis.NORMAL]
     return FollowedMotions(
-        found, built, frames, tuple(tool_orientations.orientations), collector, differing, levels
+        found,
+        built,
+        frames,
+        tuple(tool_orientations.orientations),
+        collector,
+        differing,
+        levels,
+        int(trace.started(np.array(along[:1], np.int64))[0]) if along else -1,
     )
 
 
 def _columns(
-    words: BlockWords, where: Positions, moves: GcodeMotions, feeds: Feeds
+    words: BlockWords, where: Positions, moves: GcodeMotions, feeds: Feeds, turn_part: bool
 ) -> dict[str, NDArray[Any]]:
-    """What is kept of the motions of a part."""
+    """What is kept of the motions of a part; turn_part: as of ``ToolOrientations``."""
     rows, force, stand = moves.block, words.modal.force, moves.tool_orientation
     place = moves.place.copy()
     # beside the contour, by the tool's radius: that is also where the motion after G40 starts
@@ -326,6 +349,11 @@ def _columns(
     place[(words.modal.flow.reason[rows] != 0) | beside | np.isnan(place).any(axis=1)] = np.nan
     placed = ~np.isnan(place[:, :1])
     feed = feeds.of(rows + words.start, moves.length)
+    if turn_part:
+        # without a TCP mode F is also that of the axes that turn the part
+        turning = words.has(*AXES[3:])[rows] & (force[Group.TCP][rows] != 1)
+        turning &= force[Group.FEED][rows] != Feed.INVERSE_TIME
+        feed[turning & (moves.start[:, 3:] != moves.end[:, 3:]).any(axis=1)] = np.nan
     rotary_from, rotary_to = stand.rotary
     return {
         "kind": moves.kind,

@@ -20,12 +20,14 @@ from postproc.languages.gcode.control import (
     Move,
     Once,
     ProgrammedFrame,
+    ToolAxis,
     modal_codes,
     named_codes,
 )
 from postproc.languages.gcode.offsets import start
 from postproc.languages.gcode.sinumerik_expression import constant
 from postproc.languages.gcode.sinumerik_lines import RETRACT, RPL, TURN, SinumerikLines
+from postproc.languages.gcode.tilted_planes import swivelled
 from postproc.languages.gcode.words import key
 
 COMMENT = rb'("[^"\r\n]*"?)|;[^\r\n]*'
@@ -148,6 +150,12 @@ _FRAMES = {
     NAMED[name.encode()][0]: name
     for name in ("TRANS", "ATRANS", "ROT", "AROT", "SCALE", "ASCALE", "MIRROR", "AMIRROR", "CYCLE800")
 }
+_ALONG_TOOL = {
+    NAMED[name.encode()][0]
+    for name in ("TOFRAME", "TOFRAMEX", "TOFRAMEY", "TOFRAMEZ", "TOROT", "TOROTX", "TOROTY")
+} | {NAMED[b"TOROTZ"][0], NAMED[b"PAROT"][0]}
+"""What turns the coordinates along the tool or the part, and stays when a programmable frame takes another's place."""
+_ALONG_TOOL_ENDS = {NAMED[b"TOROTOF"][0], NAMED[b"PAROTOF"][0]}
 _AXES = tuple(key(letter) for letter in "XYZABC")
 _NORMAL = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 
@@ -157,19 +165,22 @@ def frame(event: Event) -> ProgrammedFrame:
     on from it.  ROT X Y Z turns about Z, the new Y, the new X; RPL= about the axis normal to the plane.  CYCLE800
     without a plane leaves no frame.  Scales, mirrors and frames that come from the machine are not read: where they
     are in force the place is not known."""
-    unknown = ProgrammedFrame(np.eye(3), np.full(6, np.nan))
+    unknown = ProgrammedFrame(np.eye(3), np.full(6, np.nan), event.frame.memory)
+    if event.frame.memory is None and _ALONG_TOOL.intersection(event.codes):
+        return replace(unknown, memory=_ORIENTED)
+    if event.frame.memory == _ORIENTED and _ALONG_TOOL_ENDS.intersection(event.codes):
+        return replace(unknown, memory=None)
     said = [_FRAMES[code] for code in event.codes if code in _FRAMES]
     if len(said) != 1:
         return unknown
     name = said[0]
     if name == "CYCLE800":
         return _swivelled(event)
-    unknown = replace(unknown, memory=event.frame.memory)
     base = event.frame
     if not name.startswith("A"):
         base = ProgrammedFrame(np.eye(3), np.zeros(6), event.frame.memory)
     given = np.array([event.words.get(axis, 0.0) for axis in _AXES])
-    if event.frame.memory == _SWIVELLED:
+    if event.frame.memory is not None:
         return unknown
     if not (set(_AXES) | {RPL}) & set(event.words):
         return base
@@ -187,19 +198,27 @@ def frame(event: Event) -> ProgrammedFrame:
     return replace(base, turn=base.turn @ turn)
 
 
-_SWIVELLED = "swivelled"
+_SWIVELLED, _ORIENTED = "swivelled", "oriented"
+"""What a frame remembers: a plane of CYCLE800, or what TOROT and the like state, is in force."""
 
 
 def _swivelled(event: Event) -> ProgrammedFrame:
     """After CYCLE800: shifts and angles (arguments 5 to 13) that are all 0 bring the rotary axes back and leave no
-    frame; without arguments the axes stay where they are, so that a plane that was swivelled is not undone."""
+    frame; without arguments the axes stay where they are, so that a plane that was swivelled is not undone; others are
+    a plane, see ``tilted_planes``."""
     text = next((note.text for note in event.notes if note.kind == "swivel"), "?")
     arguments = [part.strip() for part in text.strip("() \t").split(",")]
-    values = [constant(part.encode()) for part in arguments[4:13] if part]
-    if len(arguments) > 12 and not any(value != 0 for value in values):
+    values = [constant(part.encode()) if part else 0.0 for part in arguments]
+    if len(arguments) > 12 and not any(value != 0 for value in values[4:13]):
+        # axes that are not at 0 already go to where the data of the swivelling unit say; without a direction none moves
+        moves = event.frame.memory is None or (len(values) > 13 and abs(values[13]) == 1)
+        tool = ToolAxis.STATED if moves else ToolAxis.UNKNOWN
+        return replace(start(), tool=tool, rotary=np.where(event.position[3:] == 0, 0.0, np.nan))
+    if arguments == [""] and event.frame.memory is None:
         return start()
-    if arguments == [""] and event.frame.memory != _SWIVELLED:
-        return start()
+    plane = swivelled(event, arguments, values)
+    if plane is not None:
+        return replace(plane, memory=_SWIVELLED)
     return ProgrammedFrame(np.eye(3), np.full(6, np.nan), _SWIVELLED)
 
 

@@ -192,7 +192,7 @@ class _SinumerikLine(LineWords):
             )
             self.note(kind, text[place:close].strip())
             if name == b"$P_PFRAME":  # what it does is not read, as that of a frame from the machine
-                self.codes(place, close, b"TOFRAME")
+                self.codes(place, close, b"ROTS")
             return close
         if name in self.names:
             closed = self.arguments(stop)
@@ -290,7 +290,7 @@ class _SinumerikLine(LineWords):
             else:
                 self.note("between" if name == b"ELSE" else "assign", said)
                 if SUPERIMPOSED.search(said):
-                    self.codes(place, len(text), b"TOFRAME")
+                    self.codes(place, len(text), b"ROTS")
                 if b"$AC_OVR" in said or b"$AC_VC" in said:
                     self.codes(place, len(text), b"OVR(ON)")
             return len(text)

@@ -3,8 +3,9 @@
 Rotary axes A, B, C turn the tool against the part: R(A, B, C) = Rz(C) Ry(B) Rx(A) in the base's axes, and the tool
 is at R turned, with ``turned`` its orientation at A = B = C = 0; an axis that no block names stays at 0. That
 holds where X, Y, Z are the tool's tip (TCP modes); else the place of the tip and the orientation of the part are the
-machine's own, and only blocks with all rotary axes at 0 say where the tool is. Controls of robots take A, B, C as
-angles of the tool's frame itself (``Control.whole``). A vector, or angles A2= B2= C2=, say where the tool points in
+machine's own, and only blocks with all rotary axes at 0 say where the tool is, unless the cell states that they turn
+the part (``cell_options.TURN_PART``): then the tool is turned nowhere. Controls of robots take A, B, C as angles of
+the tool's frame itself (``Control.whole``). A vector, or angles A2= B2= C2=, say where the tool points in
 the programmed coordinates; they hold until another block states an orientation.
 
 Between two blocks rotary axes run linearly, as they do under G43.4, under ORIAXES and in the kinematics of LinuxCNC;
@@ -20,9 +21,9 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.units import DEG
 from postproc.languages.gcode.blocks import BlockWords
-from postproc.languages.gcode.control import Group
+from postproc.languages.gcode.control import Group, ToolAxis
 from postproc.languages.gcode.modal_fill import everywhere
-from postproc.languages.gcode.orientation_words import Angles, OrientationWords, Vector
+from postproc.languages.gcode.orientation_words import Angles, OrientationWords, Vector, swing
 from postproc.languages.gcode.positions import Positions, Trace
 from postproc.languages.gcode.words import key
 from postproc.toolpath import OrientationPath
@@ -39,9 +40,10 @@ _SEQUENCES = {EULER: ((2, 0), (0, 1), (2, 2)), RPY: ((2, 2), (1, 1), (0, 0))}
 @dataclass(frozen=True, eq=False)
 class ToolOrientation:
     """rotation (N, 3, 3); writable (N,): the words can be written; redundant_axis (N, 3): redundant axis; wrong (N,):
-    0, or 1 rotary axes away from 0 or not known without a TCP mode, 2 not known in one.  orient (N,) row in
-    ``ToolOrientations.orientations``, -1 where none is in force; values, before (N, 3): as in Places.  stated (N,):
-    the block itself states the whole orientation in force.  path (N,) OrientationPath."""
+    0, or 1 rotary axes away from 0 or not known without a TCP mode, 2 not known in one, 3 the tool is along a plane
+    that is no longer in force.  orient (N,) row in ``ToolOrientations.orientations``, -1 where none is in force;
+    values, before (N, 3): as in Places.  stated (N,): the block itself states the whole orientation in force.
+    path (N,) OrientationPath."""
 
     rotation: Floats
     writable: Bools
@@ -86,9 +88,10 @@ class ToolOrientation:
 class ToolOrientations:
     """The orientation of the motions of a program, which come block by block."""
 
-    def __init__(self, words: BlockWords, turned: Floats | None) -> None:
-        """given: the whole program; turned (3, 3): the tool in the base at A = B = C = 0; None where none is stated."""
-        self._given, self._turned = words, turned
+    def __init__(self, words: BlockWords, turned: Floats | None, turn_part: bool = False) -> None:
+        """given: the whole program; turned (3, 3): the tool in the base at A = B = C = 0; None where none is stated;
+        turn_part: without a TCP mode rotary axes turn the part."""
+        self._given, self._turned, self.turn_part = words, turned, turn_part
         self._tcp = words.modal.force[Group.TCP] == 1
         self._used = np.array([len(words.words(one)) > 0 for one in _ROTARY_KEYS])
         others = (*words.control.vector, *words.control.euler)
@@ -102,22 +105,29 @@ class ToolOrientations:
         """Of motions in blocks ``rows`` (N,) of ``where``, which starts at block ``first``; rapid (N,): air."""
         used = self._used
         result = ToolOrientation.unsaid(len(rows), self._turned)
-        if self._none:
+        tool = np.array([frame.tool for frame in where.frames])[where.frame[rows]]
+        if self._none and not tool.any():
             return result
         result = ToolOrientation(**{name: np.array(column) for name, column in result.__dict__.items()})
         blocks = rows + first
+        if not self._none:
+            turning = np.zeros(3, np.bool_) if self.turn_part else used
+            _machine(where, rows, rapid, turning, self._tcp[blocks], self._kind[blocks], result)
+        if tool.any():
+            self._along_planes(trace, where, rows, blocks, tool, result)
+        if self._none:
+            return result
         kind = self._kind[blocks]
-        _machine(where, rows, rapid, used, self._tcp[blocks], kind, result)
         inside = self._tcp[blocks] & (kind != _NOWHERE)
         given = self._given.part(first, first + len(where.frame))
-        turning = np.array([frame.shift[3:].any() for frame in where.frames])
+        moved = np.array([frame.shift[3:].any() for frame in where.frames])
         pairs = np.stack([kind, np.where(kind == ROTARY, 0, where.frame[rows])], axis=1)
         for one, frame in np.unique(pairs[inside], axis=0).tolist():
             here = np.flatnonzero(inside & (pairs == (one, frame)).all(axis=1))
             number = self._orientation(one, frame, where)
             orientation = self.orientations[number]
             result.orient[here] = number
-            shifted = turning[where.frame[rows[here]]]
+            shifted = moved[where.frame[rows[here]]]
             ends = where.end[rows[here], 3:]
             values = self._values(trace, one, blocks[here], ends, orientation)
             result.values[here] = values
@@ -142,6 +152,30 @@ class ToolOrientations:
             result.path[good] = self._path(one)
             result.redundant_axis[good] = orientation.redundant_axis
         return result
+
+    def _along_planes(
+        self, trace: Trace, where: Positions, rows: Ints, blocks: Ints, tool: Ints, result: ToolOrientation
+    ) -> None:
+        """Motions in frames whose z axis the tool is along, tool (N,) ToolAxis, until a rotary axis moves; and after
+        them, where no words of rotary axes say where it is."""
+        tcp = self._tcp[blocks]
+        moved = np.sort(np.concatenate([self._given.words(one).block for one in _ROTARY_KEYS]))
+        since = trace.started(where.frame[rows])
+        turned_since = np.searchsorted(moved, blocks, side="right") > np.searchsorted(
+            moved, since, side="left"
+        )
+        normal = (tool == ToolAxis.NORMAL) & ~tcp
+        result.wrong[normal] = np.where(turned_since[normal], 1, 0)
+        away = ~tcp & (tool == ToolAxis.UNKNOWN) & ~self._used.any()
+        result.wrong[away] = 3
+        unsaid = tcp & (tool != ToolAxis.STATED) & self._none
+        result.wrong[unsaid] = 2
+        result.rotation[away | unsaid | (normal & turned_since)] = np.nan
+        for frame in np.unique(where.frame[rows[normal & ~turned_since]]).tolist():
+            here = normal & ~turned_since & (where.frame[rows] == frame)
+            if self._turned is not None:
+                direction = swing(where.frames[frame].turn[None, :, 2])
+                result.rotation[here] = direction @ self._turned
 
     def _path(self, kind: int) -> OrientationPath:
         """How the orientation runs between two blocks that state it by words of a kind."""

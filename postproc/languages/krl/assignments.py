@@ -35,6 +35,7 @@ from postproc.languages.krl.target import (
 )
 from postproc.toolpath import ArcFrame, OrientationMode
 
+_SIMPLE = re.compile(rb"[A-Z_$][A-Z0-9_$]*+\Z")
 _DATA = re.compile(rb"(BASE|TOOL)_DATA[ \t]*\[([^\]]*)\][ \t]*\Z", re.I)
 _OF_RECORD = re.compile(rb"S(TOOL2?|BASE)[ \t]*\(([^()]*)\)[ \t]*\Z", re.I)
 _SPEED = re.compile(rb"SVEL_CP[ \t]*\(([^(),]*),[^(),]*,([^(),]*)\)[ \t]*\Z", re.I)
@@ -91,7 +92,7 @@ def assign(run: ExecutionContext, statement: Statement, assignment: Assignment, 
         if before or state.external_apart:
             state.external = apart(state.external)
     elif name == b"FDAT_ACT":
-        state.frames_record = _record(run, assignment, state.frames_record)
+        state.frames_record = _frames_record(run, assignment, state.frames_record)
     elif name == b"LDAT_ACT":
         state.path_record = _record(run, assignment, state.path_record)
     elif name == b"PDAT_ACT":
@@ -304,6 +305,19 @@ def _record(run: ExecutionContext, assignment: Assignment, before: Record | None
     return None if name in run.structure.assigned else run.record(name)
 
 
+_NAME = b""
+"""The key that has the name of a record in place of what it states, where that is not known."""
+
+
+def _frames_record(run: ExecutionContext, assignment: Assignment, before: Record | None) -> Record | None:
+    """The same of FDAT_ACT; {_NAME: name} where a record that no file declares is assigned."""
+    record = _record(run, assignment, None if before is None or _NAME in before else before)
+    name = assignment.value.strip().upper()
+    if record is None and not assignment.path and _SIMPLE.match(name) and name not in run.structure.assigned:
+        return {_NAME: name}
+    return record
+
+
 def _of_record(run: ExecutionContext, text: bytes) -> bytes | None:
     """The entry that ``FP1.BASE_NO`` names."""
     name, _, key = text.strip().upper().partition(b".")
@@ -315,9 +329,10 @@ def _of_record(run: ExecutionContext, text: bytes) -> bytes | None:
 
 def _apply_record(run: ExecutionContext, statement: Statement) -> None:
     state, record = run.state, run.state.frames_record
-    if record is None:
+    if record is None or _NAME in record:
         run.variables.asked.add(b"FDAT_ACT")
-        why = f"since line {statement.line}: its FDAT is declared elsewhere"
+        name = "" if record is None else f" {record[_NAME].decode('latin-1')}"
+        why = f"since line {statement.line}: its FDAT{name} is declared elsewhere"
         state.base = UnknownValue("KRL005", f"$BASE is not known {why}")
         state.tool = UnknownValue("KRL005", f"$TOOL is not known {why}")
         return

@@ -1,0 +1,58 @@
+"""Robot files with numbers that built hardware does not have."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from postproc.model.stiffness import StiffnessModel
+from postproc.robot.description import load_robot
+
+ARM = (Path(__file__).parent.parent / "robots" / "kuka_kr270.yaml").read_text()
+C2 = "value: 0.302e-6, unit: rad/(N m), ci: 0.004e-6, ci_level: unstated"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("d1: 750", "d1: 0.75", "geometry.kuka.d1 is 0.75 mm"),
+        ("a3: -55", "a3: -0.055", "geometry.kuka.a3 is -0.055 mm"),
+        (C2, "value: 0.302e-9, unit: rad/(N m)", "joint_compliance.c2 is 3.02e-10"),
+        (C2, "value: 0.302e-2, unit: rad/(N m)", "joint_compliance.c2 is 0.00302"),
+        (
+            "value: 458.00, unit: mm, ci: 27.0",
+            "value: 0.458, unit: mm, ci: 0.027",
+            "gravity_compensator.s0 is 0.000458",
+        ),
+        ("value: 184.72, unit: mm", "value: 0.18472, unit: mm", "gravity_compensator.L is 0.00018472"),
+    ],
+)
+def test_a_number_in_another_unit_is_reported(tmp_path, old, new, said):
+    assert ARM.count(old) == 1
+    path = tmp_path / "arm.yaml"
+    path.write_text(ARM.replace(old, new))
+    findings = StiffnessModel.from_robot(load_robot(path)).plausibility_findings()
+    assert [finding.code for finding in findings] == ["MOD004"]
+    assert said in findings[0].message
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (C2, "value: 0, unit: rad/(N m)"),
+        (C2, "value: 1e-12, unit: rad/(N m), ci95: 1e-7"),  # identified, and not distinguished from none
+        ("a3: -55", "a3: 0"),
+    ],
+)
+def test_what_is_not_there_is_plausible(tmp_path, old, new):
+    path = tmp_path / "arm.yaml"
+    path.write_text(ARM.replace(old, new))
+    assert StiffnessModel.from_robot(load_robot(path)).plausibility_findings() == []
+
+
+@pytest.mark.parametrize(
+    "path", sorted((Path(__file__).parent.parent / "robots").glob("*.yaml")), ids=lambda p: p.stem
+)
+def test_robots_of_the_package_are_plausible(path):
+    assert StiffnessModel.from_robot(load_robot(path)).plausibility_findings() == []
