@@ -48,25 +48,32 @@ MICRO = 1e6
 
 
 def closest_points(
-    curve: Curves, parameter: Floats, reach: Floats, shortest: Floats, enough: float, vertex: int
+    curve: Curves,
+    parameter: Floats,
+    reach: Floats,
+    shortest: Floats,
+    enough: float,
+    vertex: int,
+    each_turn: bool = True,
 ) -> tuple[Floats, float]:
     """As ``fit_points``, of one curve: points (1, K, 3) [m] from where they have the ``parameter`` (1, K) [m] on, and
     their largest distance [m] from it, inf where they have no room; ``reach`` (1, K) and ``shortest`` (1, K - 1) [m] as
-    there."""
+    there; ``each_turn``: of the curve has an error of its own, or the largest of all is made least."""
+    floor = enough if each_turn else 0.0
     points = moved_apart(curve.at(parameter)[0], shortest)
     best = evaluate_polygons(curve, points, reach, None, parameter, vertex)
     if not long_enough(points, shortest)[0]:
         return points, np.inf
-    past, box = [_sum_of_largest(curve, best, enough)], FIRST
+    past, box = [_sum_of_largest(best, _turn_nearest(curve, best, each_turn), floor)], FIRST
     for _ in range(STEPS):
         done = best.largest[0] <= enough or (len(past) > SOME and past[-1] > GAIN * past[-1 - SOME])
         if done or box < SHORTEST:
             break
-        step = _step(curve, best, shortest[0], box, enough)
+        step = _step(curve, best, shortest[0], box, floor, _turn_nearest(curve, best, each_turn))
         moved = best.points.copy()
         moved[0, 1:-1] += step
         found = evaluate_polygons(curve, moved, reach, best.parameter, best.label, vertex)
-        size = _sum_of_largest(curve, found, enough)
+        size = _sum_of_largest(found, _turn_nearest(curve, found, each_turn), floor)
         if long_enough(moved, shortest)[0] and size < past[-1]:
             best, box = found, min(WIDER * box, LONGEST)
             past.append(size)
@@ -75,24 +82,27 @@ def closest_points(
     return best.points, float(best.largest[0])
 
 
-def _turn_nearest(curve: Curves, polygon: Polygons) -> Ints:
-    """(S,) the number of the turn of the curve that is nearest to each place of the polygon."""
-    turn = curve.turn[0]
+def _turn_nearest(curve: Curves, polygon: Polygons, each_turn: bool) -> Ints:
+    """(S,) the number of the turn of the curve that is nearest to each place of the polygon; 0 if not each counts."""
+    turn = curve.turn[0] if each_turn else curve.turn[0, :1]
     return np.asarray(np.searchsorted(0.5 * (turn[1:] + turn[:-1]), polygon.parameter[0]))
 
 
-def _sum_of_largest(curve: Curves, polygon: Polygons, enough: float) -> float:
-    """[m] The largest errors beside each turn of the curve, ``enough`` [m] at least, together."""
-    largest = np.full(curve.turn.shape[1], enough)
-    np.maximum.at(largest, _turn_nearest(curve, polygon), np.linalg.norm(polygon.off[0], axis=1))
+def _sum_of_largest(polygon: Polygons, turn: Ints, enough: float) -> float:
+    """[m] The largest errors of places beside each ``turn`` (S,), ``enough`` [m] at least, together."""
+    largest = np.full(int(turn.max()) + 1, enough)
+    np.maximum.at(largest, turn, np.linalg.norm(polygon.off[0], axis=1))
     return float(largest.sum())
 
 
-def _step(curve: Curves, polygon: Polygons, shortest: Floats, box: float, enough: float) -> Floats:
-    """(K - 2, 3) [m] by how much the inner points move, ``box`` [m] at most in each coordinate."""
+def _step(
+    curve: Curves, polygon: Polygons, shortest: Floats, box: float, enough: float, turn: Ints
+) -> Floats:
+    """(K - 2, 3) [m] by how much the inner points move, ``box`` [m] at most in each coordinate;
+    ``turn`` (S,): beside which turn the places are."""
     from scipy.optimize import linprog  # where it is needed alone
 
-    off, slope, turn = polygon.off[0], polygon.slope[0], _turn_nearest(curve, polygon)
+    off, slope, turns = polygon.off[0], polygon.slope[0], int(turn.max()) + 1
     size = np.linalg.norm(off, axis=1)
     some = size > LITTLE * size.max()
     off, slope, size, turn = off[some], slope[some], size[some], turn[some]
@@ -114,7 +124,6 @@ def _step(curve: Curves, polygon: Polygons, shortest: Floats, box: float, enough
     shorter[numbers, numbers], shorter[numbers, numbers + 1] = line, -line
     lines = shorter[:, 1:-1].reshape(count, width)
 
-    turns = curve.turn.shape[1]
     largest = np.tile(turn, len(ways))[:, None] == np.arange(turns)
     rows = np.block([[errors, -largest.astype(float)], [lines, np.zeros((count, turns))]])
     most = MICRO * np.concatenate([-now, np.minimum(length - shortest, 1.0)])

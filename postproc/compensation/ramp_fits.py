@@ -214,19 +214,22 @@ class CloseFits:
         """The points of one ramp, approximated at its vertex, from ``points`` on, or these where none come nearer."""
         key = "points", len(points.along), curve.place.tobytes()
         if key not in self._known:
-            self._known[key] = _closely_fitted(ramp, curve, points.along[None], points.own, allowed)
+            self._known[key] = _closely_fitted(ramp, curve, points.along[None], points.own, allowed, False)
         found = self._known[key]
         return points if found is None or found.largest >= points.largest else found
 
 
 def _closely_fitted(
-    ramp: FittedRamps, curve: Curves, start: Floats, own: int, allowed: float
+    ramp: FittedRamps, curve: Curves, start: Floats, own: int, allowed: float, each_turn: bool = True
 ) -> FittedPoints | None:
-    """From ``start`` (1, n) [m] on, of which ``own`` is the motion that is there already."""
+    """From ``start`` (1, n) [m] on, of which ``own`` is the motion that is there already; ``each_turn`` as of
+    ``closest_points``."""
     parameter, reach, shortest, vertex = _polygons(ramp, curve, start, own, exact=False)
     if (np.diff(parameter) <= 0.0).any():
         return None
-    points, largest = closest_points(curve, parameter, reach, shortest, CLOSE_ENOUGH * allowed, vertex)
+    points, largest = closest_points(
+        curve, parameter, reach, shortest, CLOSE_ENOUGH * allowed, vertex, each_turn
+    )
     if not np.isfinite(largest):
         return None
     return FittedPoints(points[0, 1:-1], curve.nearest(points, parameter)[0, 1:-1], own, largest)
