@@ -1,4 +1,4 @@
-"""Where the force turns inside a corner, the place of the tool is found, and no motion gets too short."""
+"""Where the force turns inside a corner, the place of the path to which the tool belongs is found."""
 
 from __future__ import annotations
 
@@ -67,15 +67,3 @@ def test_places_rise_where_the_force_turns(fitted) -> None:
         rising = np.append(last, place)
         assert np.diff(rising)[1:].min() > -1e-7
         last = place[-1]
-
-
-@pytest.mark.slow
-def test_no_motion_gets_shorter_than_the_controller_runs(fitted) -> None:
-    """What evens out the points of a ramp left 0.45 mm where a cycle takes 0.6."""
-    task, _, division = fitted
-    assert division.inserted > 10
-    command = division.command[np.arange(len(division))].position
-    size = np.linalg.norm(np.diff(command, axis=0), axis=1)
-    cut = task.carries[division.source[1:]] & task.carries[division.source[:-1]]
-    shortest = task.toolpath.feed[division.source[1:]] * LIMITS.cycle
-    assert (size - shortest)[cut].min() > -2e-6

@@ -5,16 +5,13 @@ other.  Where lines as short as they may be decide how near a polygon comes, tha
 each step is a linear programme: by the slopes of the errors it makes the largest of them least, within a box around the
 points, and with no line shorter than it may be.  The length of a line is convex in its ends: one that is long enough by
 its slope is so in truth (sequential linear programming: Fletcher and Sainz de la Maza 1989).
-
-A curve turns at some places, and each has its own largest error: the sum of them is made least.  If only the largest of
-all were, a place with a smaller error would come no nearer, and would hold the others up by where its points are.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from postproc.base.arrays import Floats, Ints
+from postproc.base.arrays import Floats
 from postproc.base.units import MM
 from postproc.compensation.point_fit import (
     LONGEST,
@@ -48,64 +45,39 @@ MICRO = 1e6
 
 
 def closest_points(
-    curve: Curves,
-    parameter: Floats,
-    reach: Floats,
-    shortest: Floats,
-    enough: float,
-    vertex: int,
-    each_turn: bool = True,
+    curve: Curves, parameter: Floats, reach: Floats, shortest: Floats, enough: float, vertex: int
 ) -> tuple[Floats, float]:
     """As ``fit_points``, of one curve: points (1, K, 3) [m] from where they have the ``parameter`` (1, K) [m] on, and
     their largest distance [m] from it, inf where they have no room; ``reach`` (1, K) and ``shortest`` (1, K - 1) [m] as
-    there; ``each_turn``: of the curve has an error of its own, or the largest of all is made least."""
-    floor = enough if each_turn else 0.0
+    there."""
     points = moved_apart(curve.at(parameter)[0], shortest)
     best = evaluate_polygons(curve, points, reach, None, parameter, vertex)
     if not long_enough(points, shortest)[0]:
         return points, np.inf
-    past, box = [_sum_of_largest(best, _turn_nearest(curve, best, each_turn), floor)], FIRST
+    box, past = FIRST, [float(best.largest[0])]
     for _ in range(STEPS):
-        done = best.largest[0] <= enough or (len(past) > SOME and past[-1] > GAIN * past[-1 - SOME])
-        if done or box < SHORTEST:
+        if past[-1] <= enough or box < SHORTEST or (len(past) > SOME and past[-1] > GAIN * past[-1 - SOME]):
             break
-        step = _step(curve, best, shortest[0], box, floor, _turn_nearest(curve, best, each_turn))
+        step = _step(curve, best, shortest[0], box)
         moved = best.points.copy()
         moved[0, 1:-1] += step
         found = evaluate_polygons(curve, moved, reach, best.parameter, best.label, vertex)
-        size = _sum_of_largest(found, _turn_nearest(curve, found, each_turn), floor)
-        if long_enough(moved, shortest)[0] and size < past[-1]:
+        if long_enough(moved, shortest)[0] and found.largest[0] < past[-1]:
             best, box = found, min(WIDER * box, LONGEST)
-            past.append(size)
+            past.append(float(found.largest[0]))
         else:
             box *= NARROWER
-    return best.points, float(best.largest[0])
+    return best.points, past[-1]
 
 
-def _turn_nearest(curve: Curves, polygon: Polygons, each_turn: bool) -> Ints:
-    """(S,) the number of the turn of the curve that is nearest to each place of the polygon; 0 if not each counts."""
-    turn = curve.turn[0] if each_turn else curve.turn[0, :1]
-    return np.asarray(np.searchsorted(0.5 * (turn[1:] + turn[:-1]), polygon.parameter[0]))
-
-
-def _sum_of_largest(polygon: Polygons, turn: Ints, enough: float) -> float:
-    """[m] The largest errors of places beside each ``turn`` (S,), ``enough`` [m] at least, together."""
-    largest = np.full(int(turn.max()) + 1, enough)
-    np.maximum.at(largest, turn, np.linalg.norm(polygon.off[0], axis=1))
-    return float(largest.sum())
-
-
-def _step(
-    curve: Curves, polygon: Polygons, shortest: Floats, box: float, enough: float, turn: Ints
-) -> Floats:
-    """(K - 2, 3) [m] by how much the inner points move, ``box`` [m] at most in each coordinate;
-    ``turn`` (S,): beside which turn the places are."""
+def _step(curve: Curves, polygon: Polygons, shortest: Floats, box: float) -> Floats:
+    """(K - 2, 3) [m] by how much the inner points move, ``box`` [m] at most in each coordinate."""
     from scipy.optimize import linprog  # where it is needed alone
 
-    off, slope, turns = polygon.off[0], polygon.slope[0], int(turn.max()) + 1
+    off, slope = polygon.off[0], polygon.slope[0]
     size = np.linalg.norm(off, axis=1)
     some = size > LITTLE * size.max()
-    off, slope, size, turn = off[some], slope[some], size[some], turn[some]
+    off, slope, size = off[some], slope[some], size[some]
     tangent = curve.at(polygon.parameter)[1][0][some]
     one = off / np.maximum(size, 1e-15)[:, None]
     two = np.cross(tangent, one)
@@ -124,11 +96,11 @@ def _step(
     shorter[numbers, numbers], shorter[numbers, numbers + 1] = line, -line
     lines = shorter[:, 1:-1].reshape(count, width)
 
-    largest = np.tile(turn, len(ways))[:, None] == np.arange(turns)
-    rows = np.block([[errors, -largest.astype(float)], [lines, np.zeros((count, turns))]])
+    rows = np.block([[errors, -np.ones((len(errors), 1))], [lines, np.zeros((count, 1))]])
     most = MICRO * np.concatenate([-now, np.minimum(length - shortest, 1.0)])
-    sides = [*[(-MICRO * box, MICRO * box)] * width, *[(MICRO * enough, None)] * turns]
-    cost = np.append(np.zeros(width), np.ones(turns))
-    solved = linprog(cost, rows, most, bounds=sides, method="highs")
+    sides = [(-MICRO * box, MICRO * box)] * width
+    solved = linprog(
+        np.append(np.zeros(width), 1.0), rows, most, bounds=[*sides, (0.0, None)], method="highs"
+    )
     step = np.zeros(width) if solved.x is None else solved.x[:width] / MICRO
     return np.asarray(step.reshape(-1, 3))

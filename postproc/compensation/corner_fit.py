@@ -51,9 +51,6 @@ AS_WRITTEN = 1.05
 RIDGE = 1e-3
 """Share of the weights that keeps a point that hardly shows where it is."""
 
-SHORTER = 1e-6
-"""[m] A motion may become shorter by so much than it has to be: its digits take more."""
-
 BLOCK = 128
 """Corners fitted together."""
 
@@ -195,8 +192,7 @@ def _fit_ramps(
         fitted = with_corners(task, result, part, chosen, np.ones(len(chosen.corner), bool))
         enough = ON_RAMPS / ALLOWED
         stated = stated_alone(task)
-        feed = np.nan_to_num(task.toolpath.feed)
-        fitted, _ = _fitted(stated, fitted, enough, np.maximum(limits.ramp_end, feed * limits.cycle))
+        fitted, _ = _fitted(stated, fitted, enough)
         at_vertex = part.share[chosen.corner] == 1.0  # else where the ramp ends
         taken = np.isin(part.source[chosen.corner] + at_vertex, anyhow)
         after = _largest(stated, fitted, taken)
@@ -267,22 +263,16 @@ class _CornerSamples:
 
 
 def _fitted(
-    task: CompensationProblem, fitted: CornerDivision, enough: float = 0.0, shortest: Floats | None = None
+    task: CompensationProblem, fitted: CornerDivision, enough: float = 0.0
 ) -> tuple[CornerDivision, Floats]:
     """The best poses that were found for the points of each corner, and what remains (G,), in parts of the allowed
-    error; none is looked for where ``enough`` or less remains of all.  shortest (N,) [m]: no motion of a row becomes
-    shorter, or no shorter than it was."""
+    error; none is looked for where ``enough`` or less remains of all."""
     best, least = fitted.poses.copy(), np.full(len(fitted.group_start) - 1, np.inf)
-    first = _lengths_beside(fitted)
-    floor = first if shortest is None else np.minimum(first, _shortest_beside(fitted, shortest))
     for number in range(ROUNDS + 1):
         steps = (np.zeros((len(fitted.motion), 3)), np.zeros((len(fitted.motion), 3)))
         size = np.full(len(least), np.inf)
         for part in blocks(len(least), BLOCK):
             _evaluate(task, fitted, part, size, steps)
-        if shortest is not None:
-            short = (_lengths_beside(fitted) < floor - SHORTER).any(axis=0)
-            size[fitted.group[short]] = np.inf
         won = size < least
         least[won] = size[won]
         points = np.flatnonzero(won[fitted.group])
@@ -294,17 +284,6 @@ def _fitted(
         )
         fitted = fitted.moved(task, moved)
     return fitted.moved(task, best), least
-
-
-def _lengths_beside(fitted: CornerDivision) -> Floats:
-    """(2, P) [m] from the points of corners to those before and after them."""
-    at = [fitted.division.command[np.maximum(fitted.motion + k, 0)].position for k in (-1, 0, 1)]
-    return np.stack([lengths(at[1] - at[0]), lengths(at[2] - at[1])])
-
-
-def _shortest_beside(fitted: CornerDivision, shortest: Floats) -> Floats:
-    """(2, P) of ``shortest`` (N,) [m], of the motions that lead to the points of corners and on from them."""
-    return np.asarray(shortest[fitted.division.source[fitted.motion + np.arange(2)[:, None]]])
 
 
 def _largest(task: CompensationProblem, fitted: CornerDivision, accepted: Bools) -> Floats:

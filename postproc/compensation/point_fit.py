@@ -18,16 +18,12 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.units import MM
-from postproc.compensation.brackets import Brackets
 
 STEPS, WEIGHINGS, SECANTS = 24, 8, 4
 """Gauss-Newton steps, how often the weights are raised within one, and steps to the nearest place of the curve."""
 
 FIRST, SHORTEST, LONGEST = 5e-4, 2e-6, 2e-3
 """[m] Length of a step: at first; where the search ends; at most."""
-
-TURNINGS = 5
-"""Steps to the place of a polygon that is nearest to where its curve turns."""
 
 SPREADS, TOO_SHORT = 12, 1e-7
 """How often lines that are too short are made longer after a step, and by how much [m] they may be too short then."""
@@ -239,7 +235,7 @@ def evaluate_polygons(
     secants = 2 if near is not None else SECANTS
     near = (weights @ label[..., None])[..., 0] if near is None else near[:, : place.shape[1]]
     at = curves.nearest(place, near, secants)
-    more, factors = _turns(curves, at, place)
+    more, factors = _turns(curves, at)
     weights, slope, bend = (_with_turns(values, more, factors) for values in (weights, slope, bend))
     place = weights @ points + bend
     at = curves.nearest(place, _with_turns(at, more, factors), 1)
@@ -268,26 +264,14 @@ def _labels(curves: Curves, points: Floats, label: Floats, vertex: int) -> Float
     return np.clip(fixed, label[:, :1], label[:, -1:])
 
 
-def _turns(curves: Curves, at: Floats, place: Floats) -> tuple[Ints, Floats]:
-    """Of the places on polygons that are nearest to where their curves turn: the numbers (G, T) of the places (G, S, 3)
-    before them, by their parameters ``at`` (G, S), and the share (G, T) of the distance to the next.
-
-    Where a curve turns the parameter may rise ten times as fast on the one side as on the other.
-    """
+def _turns(curves: Curves, at: Floats) -> tuple[Ints, Floats]:
+    """Of the places on polygons that are nearest to where their curves turn: the numbers (G, T) of the places before
+    them, by their parameters ``at`` (G, S), and the share (G, T) of the distance to the next."""
     rising = np.maximum.accumulate(at, axis=1)
     number = np.stack([np.sum(rising < turn[:, None], axis=1) for turn in curves.turn.T], axis=1)
     number = np.clip(number - 1, 0, at.shape[1] - 2)
-    one, every = np.arange(len(at))[:, None], np.arange(number.size)
-    low, high = rising[one, number], rising[one, number + 1]
-    none = np.zeros(number.size)
-    brackets = Brackets(none, none + 1.0, (low - curves.turn).ravel(), (high - curves.turn).ravel())
-    for _ in range(TURNINGS):
-        share = brackets.secants(every)
-        part = share.reshape(number.shape)
-        between = place[one, number] + part[..., None] * (place[one, number + 1] - place[one, number])
-        found = curves.nearest(between, low + part * (high - low), 2)
-        brackets.narrow(every, share, (found - curves.turn).ravel())
-    return number, brackets.secants(every).reshape(number.shape)
+    low, high = (np.take_along_axis(rising, number + k, 1) for k in (0, 1))
+    return number, np.clip((curves.turn - low) / np.maximum(high - low, 1e-12), 0.0, 1.0)
 
 
 def _with_turns(values: Floats, number: Ints, part: Floats) -> Floats:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,13 +87,12 @@ STARTS: tuple[tuple[Words, ...], ...] = (
 
 CLOSE_STARTS: tuple[tuple[Words, float], ...] = (
     (_both(range(-1, 2), range(-1, 2)), 1.02),
+    (_both(range(-1, 3), range(-1, 2)), 1.02),
+    (_both(range(-1, 3), range(-2, 2)), 1.02),
     (_both(range(-2, 3), range(-2, 3)), 1.02),
-    (_both(range(-2, 3), range(-2, 3)), 1.1),
-    (_both(range(-2, 3), range(-2, 3)), 1.2),
 )
 """Where points start that are fitted closely, as near to each other as the shortest motion lets them, and by which
-factor lines are longer than that: of those that are as short as they may be none can turn at first, and which of them
-lead on depends on the curve."""
+factor lines are longer than that."""
 
 ON = 1e-5
 """[m] The next point is farther on by so much at least."""
@@ -191,14 +189,6 @@ class CloseFits:
 
     def __init__(self) -> None:
         self._known: dict[tuple[str, int, bytes], FittedPoints | None] = {}
-        self._curves: dict[bytes, Curves] = {}
-
-    def curve(self, place: Floats, build: Callable[[], Curves]) -> Curves:
-        """The close curve of a ramp whose curve has the places (N + 2, 3) [m]."""
-        key = place.tobytes()
-        if key not in self._curves:
-            self._curves[key] = build()
-        return self._curves[key]
 
     def fit(self, ramp: FittedRamps, curve: Curves, number: int, allowed: float) -> FittedPoints | None:
         """The points of one ramp, approximated at its vertex, from the start ``number`` on, until they are within
@@ -214,22 +204,19 @@ class CloseFits:
         """The points of one ramp, approximated at its vertex, from ``points`` on, or these where none come nearer."""
         key = "points", len(points.along), curve.place.tobytes()
         if key not in self._known:
-            self._known[key] = _closely_fitted(ramp, curve, points.along[None], points.own, allowed, False)
+            self._known[key] = _closely_fitted(ramp, curve, points.along[None], points.own, allowed)
         found = self._known[key]
         return points if found is None or found.largest >= points.largest else found
 
 
 def _closely_fitted(
-    ramp: FittedRamps, curve: Curves, start: Floats, own: int, allowed: float, each_turn: bool = True
+    ramp: FittedRamps, curve: Curves, start: Floats, own: int, allowed: float
 ) -> FittedPoints | None:
-    """From ``start`` (1, n) [m] on, of which ``own`` is the motion that is there already; ``each_turn`` as of
-    ``closest_points``."""
+    """From ``start`` (1, n) [m] on, of which ``own`` is the motion that is there already."""
     parameter, reach, shortest, vertex = _polygons(ramp, curve, start, own, exact=False)
     if (np.diff(parameter) <= 0.0).any():
         return None
-    points, largest = closest_points(
-        curve, parameter, reach, shortest, CLOSE_ENOUGH * allowed, vertex, each_turn
-    )
+    points, largest = closest_points(curve, parameter, reach, shortest, CLOSE_ENOUGH * allowed, vertex)
     if not np.isfinite(largest):
         return None
     return FittedPoints(points[0, 1:-1], curve.nearest(points, parameter)[0, 1:-1], own, largest)
