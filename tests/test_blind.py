@@ -353,3 +353,18 @@ def test_what_a_whole_arm_predicts_alike_is_an_equal_rival():
     run = made(case)
     nearest = verdicts.nearest(run, 0, run.readings.value - run.without)[0]
     assert (nearest.effect, nearest.joint, nearest.margin) == ("link_gravity", "", 0.0)
+
+
+def test_fresh_poses_are_as_they_were_where_nothing_was_found():
+    run = made(case("single", "joint_compliance", 5.0, 15))
+    old, knowing = gap.fresh(run, run.oracle.model)
+    assert old == pytest.approx(1.0)
+    assert knowing < 0.5
+    records = [
+        {"fresh": [x, y], "snr": snr, "reached": True}
+        for x, y, snr in ((0.1, 0.05, 2.0), (0.3, 0.2, 5.0), (0.9, 0.9, 1.0))
+    ]
+    told = table.of_fresh([*records, {"fresh": None, "snr": 2.0, "reached": True}])
+    assert "0.200 in the median, 0.300 at worst of 2" in told[0]
+    assert "0.125 in the median, 0.200 at worst of 2" in told[1]
+    assert table.of_fresh(records[2:]) == []

@@ -701,11 +701,11 @@ def test_what_the_readings_follow_instead(spring):
     found = spring.diagnosis.search
     (named,) = spring.verdict.named
     (foil,) = (rival for rival in found.rivals if rival.is_decoy)
-    model, q = found.base.model, found.base.campaign.readings.q
+    model, campaign = found.base.model, found.base.campaign
 
     def text(effect, joint, worse):
         mine = replace(named.candidate, effect=effect, joint=joint)
-        course = decoys(model, q, mine)[0]
+        course = decoys(model, campaign, mine)[0]
         rival = replace(foil, of=mine.key, candidate=course, worse=worse, more=0.0, fitted=True)
         result = lacking(spring, rejected=((mine, OTHER_COURSE),))
         search = replace(result.diagnosis.search, rivals=(rival,))

@@ -15,6 +15,7 @@ from measured import MARKERS, on_markers, plan, robot
 
 from postproc.base.geometry import Poses
 from postproc.diagnosis import approach_sides, candidate_fits, diagnosis, verdict
+from postproc.diagnosis.accidents import gross_errors
 from postproc.diagnosis.candidate_fits import ChoiceFits
 from postproc.diagnosis.candidates import candidates, fewest_parameters, is_visible
 from postproc.diagnosis.decoys import AlternativeForm, decoys
@@ -42,7 +43,7 @@ from postproc.identification.unknowns import asked_for
 from postproc.measurements import measurements_csv
 from postproc.model import StiffnessModel
 from postproc.robot.description import load_robot
-from postproc.workflows.diagnose import DiagnoseRequest, diagnose_robot, gross_errors
+from postproc.workflows.diagnose import DiagnoseRequest, diagnose_robot
 
 SIGMA = 2e-5
 SAMPLES = Path(__file__).parent.parent / "samples"
@@ -205,11 +206,11 @@ def test_a_compensator_is_told_from_a_stiffness_that_varies():
     found = [
         c for c in candidates(campaign, base.model, base.point.nuisances) if c.name == "gravity_compensator"
     ]
-    (foil,) = decoys(base.model, campaign.readings.q, found[0])
+    (foil,) = decoys(base.model, campaign, found[0])
     assert (foil.name, foil.joint) == ("joint_compliance", "A2")
     assert "varying with its angle" in foil.label
-    other = next(c for c in candidates(campaign, model, campaign.start()) if c.name == "backlash")
-    assert not decoys(base.model, campaign.readings.q, other)
+    other = next(c for c in candidates(campaign, model, campaign.start()) if c.name == "tool_compliance")
+    assert not decoys(base.model, campaign, other)
 
 
 @pytest.mark.slow
@@ -270,7 +271,9 @@ def test_a_wave_of_another_order_is_no_harmonic():
 )
 def test_a_faint_pattern_leaves_a_name_as_it_is(monkeypatch, share, known, more):
     monkeypatch.setattr(verdict, "reduced_chi2_of", lambda search, last: (1.0, False))
-    search = SimpleNamespace(linear=SimpleNamespace(problem=SimpleNamespace(known=known)), explained=None)
+    search = SimpleNamespace(
+        linear=SimpleNamespace(problem=SimpleNamespace(known=known)), explained=None, chosen=()
+    )
     assert verdict.more_remains(search, [ResidualPattern("A2 over its angle", "", share)]) == more
     assert not verdict.more_remains(search, [])
 

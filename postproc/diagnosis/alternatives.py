@@ -84,7 +84,7 @@ def find_alternatives(
         own, of_mine = paid(scaled(group)), []
         against = [
             *enumerate(linear.candidates),
-            *((-1, decoy) for decoy in decoys(base.model, campaign.readings.q, mine)),
+            *((-1, decoy) for decoy in decoys(base.model, campaign, mine)),
         ]
         for other, candidate in against:
             if other in last.groups or candidate.contains(mine) or mine.contains(candidate):

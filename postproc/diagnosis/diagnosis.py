@@ -81,7 +81,7 @@ def diagnose(
     stated = fit(campaign, model, (), rows)
     stage("fitting the model's own parameters")
     sample = sample_of(campaign)
-    base = fit(sample, model, own, nuisances=stated.point.nuisances)
+    base = fit(sample, model, own, nuisances=stated.point.nuisances, complete=False)
     stage("looking for what is missing")
     fits = ChoiceFits(sample, base)
     result = search(fits)

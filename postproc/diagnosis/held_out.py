@@ -42,22 +42,41 @@ def held_out_gain(search: Search, last: Explained, group: int, part: Ints | None
     part = np.where(np.isin(part, large), -1, part)
     if not (part >= 0).any() or (len(large) == 0 and len(np.unique(part)) < 2):
         return np.nan
-    linear, given = search.linear, search.linear.problem
-    rows = len(linear.residual) - linear.priors
-    # priors are never left out
-    of = np.append(np.repeat(part, rows // len(part)), np.full(linear.priors, -1))
-    variance = scatter(given, last)
+    variance = scatter(search.linear.problem, last)
 
     def surprise(groups: Sequence[int]) -> float:
-        columns = [linear.common, *(linear.columns[g] for g in groups)]
-        matrix = np.concatenate(columns, axis=1)
-        own = np.concatenate([np.zeros(linear.common.shape[1]), *(_expected(given, last, g) for g in groups)])
-        matrix = np.concatenate([matrix, np.diag(own)[own > 0]])
-        more = len(matrix) - len(of)
-        target = np.append(linear.residual, np.zeros(more))
-        return _misfit(matrix, target, np.append(of, np.full(more, -1)), variance)
+        matrix, target, of = _with_expectations(search, last, groups, part)
+        own, logarithms = _misfit(matrix, target, of, variance)
+        return float(own.sum()) + logarithms
 
     return surprise([g for g in last.groups if g != group]) - surprise(last.groups)
+
+
+def left_out_variance(search: Search, last: Explained, part: Ints) -> tuple[float, int]:
+    """Variance of what is left out part by part and predicted from the rest, over that with which it is predicted, and
+    the number of measured values; ``part`` (R,): as of ``held_out_gain``.
+
+    What imitates something follows it where it was fitted, and not elsewhere.
+    """
+    matrix, target, of = _with_expectations(search, last, last.groups, part)
+    own, _ = _misfit(matrix, target, of, 1.0)
+    counts = int((target[of >= 0] != 0.0).sum())
+    return float(own.sum()) / max(1, counts), counts
+
+
+def _with_expectations(
+    search: Search, last: Explained, groups: Sequence[int], part: Ints
+) -> tuple[Floats, Floats, Ints]:
+    """matrix (n, k), target (n,) and part (n,) of readings, and of rows of what is known besides, which are never left
+    out: -1."""
+    linear, given = search.linear, search.linear.problem
+    rows = len(linear.residual) - linear.priors
+    of = np.append(np.repeat(part, rows // len(part)), np.full(linear.priors, -1))
+    matrix = np.concatenate([linear.common, *(linear.columns[g] for g in groups)], axis=1)
+    own = np.concatenate([np.zeros(linear.common.shape[1]), *(_expected(given, last, g) for g in groups)])
+    matrix = np.concatenate([matrix, np.diag(own)[own > 0]])
+    more = len(matrix) - len(of)
+    return matrix, np.append(linear.residual, np.zeros(more)), np.append(of, np.full(more, -1))
 
 
 def worst_ratio(search: Search, last: Explained, group: int, part: Ints) -> float:
@@ -104,11 +123,12 @@ def _expected(problem: Problem, last: Explained, group: int) -> Floats:
     return np.full(len(problem.places[group]), 1.0 / (USUAL * largest) if largest > 0 else 0.0)
 
 
-def _misfit(matrix: Floats, target: Floats, part: Ints, variance: float) -> float:
-    """-2 ln(likelihood) of ``target`` (n,), each part predicted from the others by ``matrix`` (n, k)."""
+def _misfit(matrix: Floats, target: Floats, part: Ints, variance: float) -> tuple[Floats, float]:
+    """-2 ln(likelihood) of ``target`` (n,), each part predicted from the others by ``matrix`` (n, k): squares of the
+    parts (K,), outliers cut, and the logarithms of their variances."""
     size = np.linalg.norm(matrix, axis=0)
     scaled = matrix[:, size > 0] / size[size > 0]
-    whole, aim, total = scaled.T @ scaled, scaled.T @ target, 0.0
+    whole, aim, squares, logarithms = scaled.T @ scaled, scaled.T @ target, [], 0.0
     for k in np.unique(part[part >= 0]):
         out = scaled[part == k]
         value, vector = np.linalg.eigh(whole - out.T @ out)
@@ -120,11 +140,10 @@ def _misfit(matrix: Floats, target: Floats, part: Ints, variance: float) -> floa
         gram = np.eye(b.shape[1]) + b.T @ b
         shared = np.linalg.solve(gram, b.T @ away)
         own = (away - b @ shared) ** 2 / variance
-        total += float(np.minimum(own, OUTLIER_LIMIT**2).sum() + len(own) * np.log(variance))
-        total += float(
-            min(shared @ shared / variance, OUTLIER_LIMIT**2 * len(shared)) + np.linalg.slogdet(gram)[1]
-        )
-    return total
+        together = min(float(shared @ shared) / variance, OUTLIER_LIMIT**2 * len(shared))
+        squares.append(float(np.minimum(own, OUTLIER_LIMIT**2).sum()) + together)
+        logarithms += float(len(own) * np.log(variance) + np.linalg.slogdet(gram)[1])
+    return np.array(squares), logarithms
 
 
 def regions_of(search: Search) -> Ints | None:

@@ -10,7 +10,14 @@ import numpy as np
 from postproc.diagnosis.candidate_fits import has_zeros
 from postproc.diagnosis.candidates import EVERY, Candidate, fewest_parameters, names_of
 from postproc.diagnosis.decoys import HAS_DECOYS
-from postproc.diagnosis.held_out import FOLDS, held_out_gain, regions_of, sessions_of, worst_ratio
+from postproc.diagnosis.held_out import (
+    FOLDS,
+    held_out_gain,
+    left_out_variance,
+    regions_of,
+    sessions_of,
+    worst_ratio,
+)
 from postproc.diagnosis.imitations import (
     MARGIN,
     follows_another_course,
@@ -203,7 +210,7 @@ def judge(search: Search) -> Verdict:
         rare = np.inf if formless else EXPLAINS
         kept = list(range(len(named)))
         while kept:
-            alone, _ = reduced_chi2_of(search, explained(linear.problem, [groups[k] for k in kept]))
+            alone = _remaining_variance(search, explained(linear.problem, [groups[k] for k in kept]))
             taken = _explained_share(alone, bare, linear.problem.known)
             still = [k for k in kept if taken >= EVERY_ARM.get(named[k].effect, rare)]
             if still == kept:
@@ -304,12 +311,33 @@ def reduced_chi2_of(search: Search, last: Explained) -> tuple[float, bool]:
     return variance, given.known and variance > 1.0 + TOLERATED + EXCESS * spread
 
 
+def _elsewhere(search: Search, last: Explained) -> tuple[float, int]:
+    """``left_out_variance`` of regions, of poses where these are few; none where nothing states the scatter."""
+    if not search.linear.problem.known:
+        return 0.0, 0
+    campaign, part = search.base.campaign, regions_of(search)
+    return left_out_variance(
+        search, last, folds_of(campaign, min(FOLDS, campaign.poses)) if part is None else part
+    )
+
+
+def fails_elsewhere(search: Search) -> bool:
+    """Whether regions that were left out are off by clearly more than scatter and the uncertainty of the fit make."""
+    variance, counts = _elsewhere(search, search.explained)
+    return counts > 0 and variance > 1.0 + TOLERATED + EXCESS * np.sqrt(2.0 / counts)
+
+
+def _remaining_variance(search: Search, last: Explained) -> float:
+    """The variance that remains, where the fit was or elsewhere, over the stated one."""
+    return max(reduced_chi2_of(search, last)[0], _elsewhere(search, last)[0])
+
+
 def more_remains(search: Search, patterns: Sequence[ResidualPattern]) -> bool:
     """Whether more than scatter remains of what was chosen, whose residual has clear ``patterns``."""
     known = search.linear.problem.known
-    return reduced_chi2_of(search, search.explained)[1] or any(
-        not known or one.share > FAINT for one in patterns
-    )
+    if reduced_chi2_of(search, search.explained)[1] or (search.chosen and fails_elsewhere(search)):
+        return True
+    return any(not known or one.share > FAINT for one in patterns)
 
 
 def _evidence(search: Search, last: Explained, group: int) -> Evidence:

@@ -125,6 +125,7 @@ def fit(
     near: bool = False,
     factor: float = 1.0,
     exact: bool = True,
+    complete: bool = True,
 ) -> Fit:
     """The weighted least squares of the readings ``rows`` (R,) (all without it) over the unknowns and nuisances.
 
@@ -133,7 +134,8 @@ def fit(
     stated, they are as wide as the residuals ask for.  ``robust``: readings far off are weighed down (Huber).
     ``nuisances``: tracker and targets to start with, where they are about known; ``near``: so is the model, the columns
     at which serve all through.  ``factor``: about the variance of the readings over the assumed one, to start with.
-    Where it need not be ``exact`` the last step may be one of ``NEAR``, a thousandth of a variance.
+    Where it need not be ``exact`` the last step may be one of ``NEAR``, a thousandth of a variance.  Of a model that
+    is not ``complete`` what exceeds the stated scatter is no scatter: what this would leave observable stays unknown.
 
     Raises Refusal IDN002 with fewer readings than unknowns, IDN003 where the model to start with has no rest.
     """
@@ -174,14 +176,15 @@ def fit(
             point, weights = _robust(campaign, point, free, plain, rows, factor, noise.known)
         if not (point.settled or near):
             point = with_columns(campaign, point, free)
-        analysis, before = _insight(campaign, point, free, weights, factor), factor
+        judged = 1.0 if not complete and noise.known else np.inf
+        analysis, before = _insight(campaign, point, free, weights, factor, judged), factor
         factor, exceeded, freedom, quantile = _variance(
             campaign, point, free, weights, plain, noise, analysis
         )
         if again and not exactly and abs(np.log(factor / before)) > SAME_FACTOR:
             again -= 1
             continue
-        analysis = _insight(campaign, point, free, weights, factor)
+        analysis = _insight(campaign, point, free, weights, factor, judged)
         if not analysis.dropped:
             if last:
                 break
@@ -294,8 +297,14 @@ def _with_turns(campaign: Campaign, point: Point, noise: Noise, weights: Weighti
 
 
 def _insight(
-    campaign: Campaign, point: Point, free: Sequence[Unknown], weights: Weighting, factor: float
+    campaign: Campaign,
+    point: Point,
+    free: Sequence[Unknown],
+    weights: Weighting,
+    factor: float,
+    most: float,
 ) -> Identifiability:
+    """What is observable where the readings scatter as ``factor`` has it, and by ``most`` at most."""
     columns, nuisance = (np.nan_to_num(weights(part)) for part in point.required_columns)
     if len(columns) > MANY * (columns.shape[1] + nuisance.shape[1]):
         # as many rows as there are columns, with the same information
@@ -305,7 +314,7 @@ def _insight(
     columns = np.concatenate([columns, np.zeros((len(known), columns.shape[1]))])
     nuisance = np.concatenate([nuisance, known])
     prior, values = prior_rows(free) * prior_weight(factor), point.values(free)
-    return identifiability(free, columns, nuisance, campaign.nuisance_names, prior, values, factor)
+    return identifiability(free, columns, nuisance, campaign.nuisance_names, prior, values, factor, most)
 
 
 def _variance(

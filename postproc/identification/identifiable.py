@@ -55,13 +55,15 @@ def identifiability(
     prior: Floats,
     values: Floats,
     factor: float = 1.0,
+    most: float = np.inf,
 ) -> Identifiability:
     """What whitened ``columns`` (n, P) of the unknowns, per scale, and ``nuisance`` (n, U) determine.
 
     prior (P, P): rows of the priors; values (P,) [SI] of the model; factor: variance of the readings over the assumed
-    one. Columns are judged after what the nuisances explain is taken out, in their order: one that those before it can
-    imitate is left out.  Then the least certain is, as long as one states nothing: its 95 % interval is wider than its
-    value, and than the stated one or, where none is stated, ``FAR`` times the parameter's usual size.
+    one, of which ``most`` at most is scatter by which an unknown is judged.  Columns are judged after what the
+    nuisances explain is taken out, in their order: one that those before it can imitate is left out.  Then the least
+    certain is, as long as one states nothing: its 95 % interval is wider than its value, and than the stated one or,
+    where none is stated, ``FAR`` times the parameter's usual size.
     """
     frames = basis(nuisance)
     outside = np.concatenate([columns - frames @ (frames.T @ columns), prior])
@@ -89,7 +91,9 @@ def identifiability(
     while observable:
         part = outside[:, observable]
         covariance = _inverse(part) * factor
-        wide = COVERAGE * np.sqrt(np.diag(covariance))
+        wide = COVERAGE * np.sqrt(
+            np.diag(covariance if most >= factor else _judged(part, prior, factor, most))
+        )
         limit = np.array([_limit(unknowns[k], values[k]) / unknowns[k].parameter.scale for k in observable])
         worst = int(np.argmax(wide / limit))
         if wide[worst] <= limit[worst]:
@@ -128,6 +132,14 @@ def basis(columns: Floats) -> Floats:
         return np.zeros((len(columns), 0))
     u, s, _ = np.linalg.svd(used, full_matrices=False)
     return np.asarray(u[:, s > 1e-8 * s[0]])
+
+
+def _judged(part: Floats, prior: Floats, factor: float, most: float) -> Floats:
+    """The covariance of the columns ``part`` (n + P, k), whose last rows are of priors beside readings of the variance
+    ``factor``, where that of the readings is ``most``."""
+    weight = np.ones(len(part))
+    weight[len(part) - len(prior) :] = np.sqrt(most / factor)
+    return np.asarray(_inverse(part * weight[:, None]) * most)
 
 
 def _inverse(part: Floats) -> Floats:

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from postproc import __version__
-from postproc.base.arrays import Ints
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import place
 from postproc.base.units import MM
+from postproc.diagnosis.accidents import are_accidents, far_readings, loaded_joint, poses_off
 from postproc.diagnosis.approach_sides import diagnose_sides
 from postproc.diagnosis.diagnosis import Diagnosis, diagnose
 from postproc.diagnosis.search import model_unknowns
 from postproc.identification.campaign import Campaign
-from postproc.identification.fit import Fit, lengths, spread_of
-from postproc.identification.outliers import Outlier, outliers
 from postproc.identification.sanity_checks import check_fit, check_numbers
 from postproc.identification.validation import held_out, validated
 from postproc.measurements import measurements_csv, read_measurements
@@ -35,15 +32,15 @@ from postproc.workflows.robot_files import new_robot_file
 
 FOLDS = 5
 
-WILD, FEW = 10.0, 0.05
-"""Standard deviations from which on a reading is an accident, and the share of all that may be."""
-
 POSE_OFF = "so are others of this pose, so the arm stood elsewhere: measure the pose again"
 """What it may be where a pose is off as a whole."""
 
-BESIDE_A_POSE = {"nothing_missing": "unknown", "named": "partly_named"}
-"""Verdicts on all other readings -> on all, where a pose is off as a whole: what opens under one load alone looks like
-an accident."""
+GAVE_WAY = "so are others under the largest loads on {}, so something gave way there"
+"""The same where what is off goes with the load on a joint."""
+
+BESIDE_OTHERS = {"nothing_missing": "unknown", "named": "partly_named"}
+"""Verdicts on all other readings -> on all, where those that are far off are no accidents, a pose is off as a whole, or
+they go with the load: what opens under some loads alone looks like an accident."""
 
 
 @dataclass(frozen=True)
@@ -73,24 +70,23 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
     findings = [*measured.findings, *check_fit(campaign, model, own)]
     diagnosis, sides = diagnose_sides(campaign, model, stage)
     findings += sides
-    wild = gross_errors(diagnosis.final)
-    if wild:
+    struck, wild = campaign_of(diagnosis), far_readings(diagnosis.final)
+    if wild and not are_accidents(struck, wild):
+        diagnosis = _beside_others(diagnosis)
+    elif wild:
         stage("once more without outliers")
         inliers = np.setdiff1d(np.arange(len(campaign)), [one.row for one in wild])
-        struck = campaign_of(diagnosis)
         rest = Campaign(struck.readings.part(inliers), campaign.stated_tool)
-        whole = poses_off(struck, wild)
+        whole, loaded = poses_off(struck, wild), loaded_joint(diagnosis.final, wild)
         diagnosis = diagnose(rest, model)
-        if len(whole):
-            verdict = diagnosis.verdict
-            diagnosis = replace(
-                diagnosis, verdict=replace(verdict, word=BESIDE_A_POSE.get(verdict.word, verdict.word))
-            )
+        if len(whole) or loaded:
+            diagnosis = _beside_others(diagnosis)
+        cause = GAVE_WAY.format(loaded) if loaded else ""
         findings += [
             Finding(
                 "DIA002",
                 f"the reading is {one.distance / MM:.3g} mm off ({one.sigmas:.0f} sigma): "
-                + (POSE_OFF if struck.pose[one.row] in whole else one.what),
+                + (POSE_OFF if struck.pose[one.row] in whole else cause or one.what),
                 one.file,
                 one.line,
             )
@@ -124,6 +120,12 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
         validation=tuple(_validated(path, measured, diagnosis) for path in request.validate),
     )
     return _published(request, measured, result, stage)
+
+
+def _beside_others(diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis of some readings where others are far off."""
+    word = BESIDE_OTHERS.get(diagnosis.verdict.word, diagnosis.verdict.word)
+    return replace(diagnosis, verdict=replace(diagnosis.verdict, word=word))
 
 
 def _searched(diagnosis: Diagnosis, file: Path) -> list[Finding]:
@@ -173,25 +175,6 @@ def _validated(path: Path, measured: Measured, diagnosis: Diagnosis) -> Validate
 def campaign_of(diagnosis: Diagnosis) -> Campaign:
     """The readings as they were diagnosed, sides of approach and all."""
     return diagnosis.final.campaign
-
-
-def gross_errors(final: Fit) -> tuple[Outlier, ...]:
-    """Readings so far off that they would decide; none where there are so many that they are no accidents."""
-    length = lengths(final.point.residual, final.plain_weights)
-    if length.max(initial=0.0) < 0.5 * WILD * spread_of(length, final.noise.known):
-        return ()
-    detected, _ = outliers(final, np.ones(len(length), bool))
-    wild = tuple(one for one in detected if one.sigmas > WILD)
-    # an accident strikes one reading, or one pose: where several poses are off as a whole, the arm was there
-    by_accident = len(wild) <= FEW * len(length) and len(poses_off(final.campaign, wild)) <= 1
-    return wild if by_accident else ()
-
-
-def poses_off(campaign: Campaign, several: Sequence[Outlier]) -> Ints:
-    """Numbers (K,) of poses at which more than one reading is off: of one a beam may be broken, but where others say
-    the same the arm stood elsewhere."""
-    pose = campaign.pose[[one.row for one in several]]
-    return np.flatnonzero(np.bincount(pose, minlength=1) > 1)
 
 
 def heaviest(request: DiagnoseRequest, robot: Robot) -> float:

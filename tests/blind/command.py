@@ -67,6 +67,9 @@ FURTHER = 150
 SETTLED = ("decoy", "compensator_narrow")
 """Rows of which the proposed poses are measured too, beside the single ones."""
 
+PREDICTED = ("single", "decoy", "pair", "triple")
+"""Rows of which fresh poses are predicted with the new robot file."""
+
 _own: list[Diagnosing] = []
 """The process that diagnoses for this one."""
 
@@ -92,7 +95,7 @@ def record_of(case: Case, diagnosing: Diagnosing, more: bool = True) -> dict:
         answer = diagnosing(folder, ["data.csv"], "robot.yaml", "new")
         new = folder / "new.yaml"
         found = StiffnessModel.from_robot(load_robot(new)) if new.exists() else None
-        record = judged(run, answer, found, alone)
+        record = judged(run, answer, found, alone, more and case.row in PREDICTED)
         if alone and found and answer["verdict"] == "named":
             record["again"] = diagnosing(folder, ["data.csv"], "new.yaml", "again")["verdict"]
         plan = folder / "new.next_poses.csv"

@@ -3,6 +3,7 @@ which effect it is."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -23,9 +24,8 @@ from .oracle import joined, own_unknowns, unknowns_in
 POSES = 20
 
 
-def closed(run: Run, found: StiffnessModel) -> float:
-    """Share of what an oracle closes of the gap, root mean square: its own readings fitted without what is hidden, and
-    with it.  ``found``: the model that the diagnosis has written."""
+def left_over(run: Run) -> Callable[[StiffnessModel], float]:
+    """[m] root mean square that a model leaves at poses that were not measured; tracker and targets found anew."""
     rng = np.random.default_rng([run.case.number, run.case.seed, 3])
     design = _elsewhere(run, rng)
     value = measured.observed(run.scene, design)
@@ -36,9 +36,23 @@ def closed(run: Run, found: StiffnessModel) -> float:
         given = registered(seen, at, np.ones(len(seen), bool))
         return float(np.sqrt(np.mean(seen.residual(at, given) ** 2)))
 
-    filed = model_of(run.robot)
+    return left
+
+
+def closed(run: Run, found: StiffnessModel) -> float:
+    """Share of what an oracle closes of the gap, root mean square: its own readings fitted without what is hidden, and
+    with it.  ``found``: the model that the diagnosis has written."""
+    left, filed = left_over(run), model_of(run.robot)
     before = left(fit(Campaign(run.readings), filed, search.model_unknowns(filed)).model)
     return (before - left(found)) / (before - left(knowing(run)))
+
+
+def fresh(run: Run, found: StiffnessModel) -> list[float]:
+    """What the model ``found`` leaves at fresh poses, over what the robot file as it was leaves there; and the same of
+    who knows which effects are there: no fit of these readings is expected to leave less."""
+    left = left_over(run)
+    old = left(model_of(run.robot))
+    return [left(found) / old, left(knowing(run)) / old]
 
 
 def knowing(run: Run) -> StiffnessModel:

@@ -75,6 +75,16 @@ def is_wrong(record: dict) -> bool:
     return record["outcome"] == "wrong"
 
 
+def of_fresh(records: Records) -> list[str]:
+    """What new robot files leave at fresh poses, of cases that show at least twice as much as readings scatter."""
+    both = [r["fresh"] for r in records if r.get("fresh") and r["snr"] >= 2 and r["reached"]]
+    words = "fresh poses, RMS new over old, SNR >= 2", "  of who knows which effects are there"
+    return [
+        f"{name:46} {np.median(of):.3f} in the median, {max(of):.3f} at worst of {len(of)}"
+        for name, of in zip(words, zip(*both, strict=True), strict=False)
+    ]
+
+
 def matrix(records: Records) -> list[str]:
     """The rows of the matrix."""
     by = {row: [r for r in records if r["row"] == row and r["reached"]] for row in ROWS}
@@ -142,6 +152,7 @@ def matrix(records: Records) -> list[str]:
             f"{'gap closed of what an oracle closes, SNR >= 2':46} {100 * np.median(closed):.1f} % in the median,"
             f" {100 * np.mean(np.clip(closed, 0, 1)):.1f} % in the mean of {len(closed)}"
         )
+    told += of_fresh(records)
     unreached = Counter(tuple(r["effects"]) for r in records if not r["reached"])
     if unreached:
         told.append(

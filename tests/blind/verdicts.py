@@ -15,18 +15,28 @@ from postproc.model import StiffnessModel
 from . import measured
 from .arm import model_of
 from .cases import Run
-from .gap import closed
+from .gap import closed, fresh
 from .oracle import MARGIN, Rival
 
 GEOMETRY = ("link_geometry", "joint_offset")
+
+SOLVED = ("exact", "ambiguous", "undecided")
+"""Outcomes that name the truth, or have it in their sets."""
 
 WITHOUT_JOINTS = ("link_gravity",)
 """Effects of an arm as a whole, whatever joints their parameters stand beside."""
 
 
-def judged(run: Run, answer: dict, found: StiffnessModel | None = None, with_gap: bool = False) -> dict:
+def judged(
+    run: Run,
+    answer: dict,
+    found: StiffnessModel | None = None,
+    with_gap: bool = False,
+    with_fresh: bool = False,
+) -> dict:
     """The record of a run: what was hidden, what was said (``compensate diagnose --json``), and whether that is right.
-    ``found``: the model of the robot file that was written.
+    ``found``: the model of the robot file that was written; ``with_gap``: how much of the gap that closes;
+    ``with_fresh``: what it leaves at fresh poses, where the answer is right or has the truth in its set.
 
     outcome: exact; ambiguous (with the truth, where an oracle can not tell it from something else), undecided (the
     same where it can); unseen (nothing is said of what an oracle can not tell from nothing, and all else is right);
@@ -51,6 +61,7 @@ def judged(run: Run, answer: dict, found: StiffnessModel | None = None, with_gap
         "right": right(run.case.row, outcome),
         "covered": covered(run, found) if outcome == "exact" and found else None,
         "closed": closed(run, found) if with_gap and found else None,
+        "fresh": fresh(run, found) if with_fresh and found and outcome in SOLVED else None,
         "answer": {key: value for key, value in answer.items() if key in TOLD},
     }
 
