@@ -22,6 +22,7 @@ from postproc.compensation.brackets import Brackets
 from postproc.compensation.desired_path import interpolate_poses
 from postproc.compensation.gap_sides import GapSides
 from postproc.compensation.path_error import PathSegments
+from postproc.compensation.place_search import PlacesBeside
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.run_sides import ON_LINE, ON_PARABOLA, SAME_PLACE, Stations, rounded_sides
 from postproc.compensation.subdivision import Subdivision, subdivided_motions
@@ -398,14 +399,16 @@ def deviations(
     lie, those of the place without.
 
     The force belongs to the place of the path that the tool is nearest to, where the path is square to the way to it;
-    it is found by secants along the path, from row (S,) and share (S,) on.
+    it is found by secants along the path, from row (S,) and share (S,) on, and between two places where these fail.
     """
     n = len(row)
     row, share = row.copy(), np.asarray(share, float).copy()
     found = Deviations(row, share, np.full((n, 3), np.inf), np.full((n, 3), np.inf))
     last, moved = np.full(n, np.nan), np.full(n, np.nan)
-    active = np.arange(n)
-    for _ in range(ROUNDS):
+    beside = PlacesBeside(n)
+
+    def ahead(active: Ints) -> Floats:
+        """(K,) [m] by how much the tools ``active`` (K,) are ahead of their places; NaN where there is no answer."""
         at, where = row[active], share[active]
         wanted, tangent = original(task, at, where)
         goal = task.goal(at, wanted, where)
@@ -420,14 +423,23 @@ def deviations(
         shift = shift - gap[:, None] * tangent
         found.shift[active] = np.where(good[:, None], shift, np.inf)
         found.turn[active] = np.where(good[:, None], turn, np.inf)
+        gap = np.where(good, gap, np.nan)
+        beside.put(active, at, where, gap)
+        return gap
+
+    active = np.arange(n)
+    for _ in range(ROUNDS):
+        gap = ahead(active)
         with np.errstate(invalid="ignore", divide="ignore"):
             slope = (last[active] - gap) / moved[active]
         slope = np.where(np.isfinite(slope), np.clip(slope, FLATTEST, 1.0 / FLATTEST), 1.0)
         step = gap / slope
-        going = good & (np.abs(step) > SETTLED)
+        going = np.abs(step) > SETTLED
         if not going.any():
-            break
+            return found
         last[active], moved[active] = gap, step
         active = active[going]
         row[active], share[active] = _moved(task, row[active], share[active], step[going])
+    # where the force turns, secants lead from one side of the turn to the other and back
+    beside.search(active, task.desired_path.length, row, share, ahead, SETTLED)
     return found
