@@ -199,5 +199,13 @@ CODES = define(
             action="Read the path error between the points as written, and the error of the part.",
             example="A slot from air to air: its end points carry no force, its middle 300 N.",
         ),
+        "COR025": Code(
+            "info",
+            "motions shorter than an interpolation cycle",
+            meaning="At the programmed feed, motions beside inserted points are shorter than a controller cycle.",
+            consequence="The controller may slow down there; the path is as reported.",
+            action="Use a smaller feed there, or a longer force_ramp if the force changes more slowly.",
+            example="A point 0.3 mm from the next at 72 mm/s: 4 ms, with a cycle of 12 ms.",
+        ),
     }
 )

@@ -31,6 +31,9 @@ ROUNDING = 1e-6
 HELP = "allow inserted motions (no --no-insert), raise max_growth, or loosen the tolerance"
 LONGER_RAMP = "the force steps inside this cut: state a longer force_ramp if it changes more slowly"
 
+SHORT = 0.9
+"""Share of an interpolation cycle: a motion that lasts less is one at which the controller may slow down."""
+
 PARTS = 8
 """Parts of a motion between which the correction on a ramp of the force is compared."""
 
@@ -219,6 +222,24 @@ def evaluate_transitions(
         int(_stops(task, result, division).sum()),
         len(division.lead_ins),
     )
+
+
+def short_motions(task: CompensationProblem, division: Subdivision, cycle: float) -> Ints:
+    """The motions (S,) of ``division`` beside inserted points that are shorter than what the tool moves in ``cycle``
+    [s] at the programmed feed: where a correction changes faster than the path goes on, points that are apart on the
+    path are together in space.  Arcs are not looked at."""
+    if len(division) < 2:
+        return np.empty(0, np.int64)
+    source, point = division.source, division.role == Role.INTERMEDIATE
+    beside = point.copy()
+    beside[1:] |= point[:-1] & (source[1:] == source[:-1])
+    beside[0] = False
+    chosen = np.flatnonzero(beside & np.isnan(division.sweep))
+    ends = division.command[chosen].position, division.command[chosen - 1].position
+    with np.errstate(invalid="ignore"):
+        return np.asarray(
+            chosen[lengths(ends[0] - ends[1]) < SHORT * task.toolpath.feed[source[chosen]] * cycle]
+        )
 
 
 def _rates_on_ramps(task: CompensationProblem, segments: PathSegments) -> Floats:

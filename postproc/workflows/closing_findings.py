@@ -7,7 +7,7 @@ import numpy as np
 from postproc.base import rotary_words
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
-from postproc.compensation.path_comparison import errors_inside
+from postproc.compensation.path_comparison import errors_inside, short_motions
 from postproc.compensation.splines import unknown_displacements
 from postproc.compensation.subdivision import Subdivision
 from postproc.output.write import (
@@ -56,7 +56,7 @@ def closing_findings(request: Request, ready: Prepared, written: WrittenProgram)
             help = _POLE if unit == DEG and _by_pair(path, row) else ""
             findings.append(Finding("COR005", message, file, int(path.line[row]), help=help))
     findings += _between(request, ready, written) + _not_turned(ready, written)
-    findings += _changing_forces(ready, written)
+    findings += _changing_forces(ready, written) + _short(ready, written)
     findings += _started(ready, written)
     return findings + _splines(ready, written) + _assumed(request, ready, written)
 
@@ -77,6 +77,19 @@ def _changing_forces(ready: Prepared, written: WrittenProgram) -> list[Finding]:
         " between them is larger in the same proportion"
     )
     return [Finding("COR024", message, task.file, int(task.toolpath.line[rows[worst]]))]
+
+
+def _short(ready: Prepared, written: WrittenProgram) -> list[Finding]:
+    """Motions that the correction leaves shorter than the controller runs without slowing down."""
+    path, division = ready.task.toolpath, written.division
+    short = short_motions(ready.task, division, 1e-3 * ready.cell.cycle_ms)
+    if not len(short):
+        return []
+    cycle = f"an interpolation cycle of {ready.cell.cycle_ms:g} ms at the programmed feed"
+    message = f"a motion is shorter than {cycle}"
+    if len(short) > 1:
+        message = f"{len(short)} motions are shorter than {cycle} (the first one here)"
+    return [Finding("COR025", message, ready.task.file, int(path.line[division.source[short[0]]]))]
 
 
 def _started(ready: Prepared, written: WrittenProgram) -> list[Finding]:
