@@ -56,7 +56,7 @@ def test_a_long_array_is_the_tuple_that_it_stands_for():
 def test_an_element_of_a_long_array_is_set_without_its_other_chunks():
     items = repeated(Leaf(0.0), 100 * CHUNK)
     changed = with_item(items, 40 * CHUNK, Leaf(1.0))
-    shared = [one is two for one, two in zip(items._chunks, changed._chunks, strict=True)]
+    shared = [one is two for one, two in zip(items.chunks, changed.chunks, strict=True)]
     assert shared.count(False) == 1
     assert items.joined(items.mapped(plain), joined) is items
 
@@ -100,14 +100,14 @@ def test_calls_of_calls_are_followed_up_to_a_number_of_statements(monkeypatch, c
 def test_loops_in_a_loop_of_unknown_length_are_run_few_times(monkeypatch):
     """What a loop does with a state is remembered: the loop around it comes with the same again."""
     blocks = 0
-    after = Propagation._after
+    after = Propagation.after_block
 
     def counted(flow: Propagation, *arguments: object):
         nonlocal blocks
         blocks += 1
         return after(flow, *arguments)
 
-    monkeypatch.setattr(Propagation, "_after", counted)
+    monkeypatch.setattr(Propagation, "after_block", counted)
     monkeypatch.setattr("postproc.languages.core.flow_runner.UNROLLED", 0)
     inner = "FOR k FROM 1 TO 9 DO\nMoveL p,v1,z1,tool0;\nENDFOR\n"
     _propagation(f"WHILE di1=1 DO\nFOR i FROM 1 TO 9 DO\n{inner * 100}ENDFOR\nENDWHILE\n")
@@ -237,7 +237,7 @@ def test_registers_through_a_loop_are_lost_after_some_passes(monkeypatch, tmp_pa
 
 def test_a_call_takes_the_time_of_its_own_variables(monkeypatch):
     asked = 0
-    is_local = VariableValues._is_local
+    is_local = VariableValues.is_local
 
     def counted(values: VariableValues, name: str) -> bool:
         nonlocal asked
@@ -249,7 +249,7 @@ def test_a_call_takes_the_time_of_its_own_variables(monkeypatch):
         values.set(f"#{number}", float(number))
     values.set("#<_GLOBAL>", 7.0)
     values.set("#<LOCAL>", 8.0)
-    monkeypatch.setattr(VariableValues, "_is_local", counted)
+    monkeypatch.setattr(VariableValues, "is_local", counted)
     outer = values.enter({"#1": 5.0, "#2": float("nan")})
     assert asked < 10
     assert [values.evaluate(name, set())[0] for name in ("#1", "#31", "#<_GLOBAL>")] == [5.0, 31.0, 7.0]

@@ -269,6 +269,7 @@ ELSEWHERE = (
     "posts/",
     "cli/posts.py",
     "base/locks.py",
+    "base/memory.py",
     "base/paged_memory.py",
     "output/atomic_write.py",
     "base/read_files.py",

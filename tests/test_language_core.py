@@ -30,6 +30,7 @@ class Places:
 
     seen: frozenset[str] = frozenset()
     at: int | None = 0
+    known = None
 
     def copy(self) -> Places:
         return Places(self.seen, self.at)

@@ -15,6 +15,7 @@ WITHOUT_PUBLIC_NAME = {
     *(("regex_automaton.py", name) for name in ("_compiler", "_constants", "_parser")),
     ("test_api.py", "report._repr_html_"),
     ("test_krl_aggregates.py", "there._replace"),
+    ("gcode_flow_programs.py", "ran._replace"),
     ("test_paged_memory.py", "_core"),
     ("array_memory.py", "_core"),
     ("borrowed.py", "view._getvalue"),

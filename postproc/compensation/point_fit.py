@@ -205,7 +205,8 @@ def moved_apart(points: Floats, shortest: Floats) -> Floats:
 
 
 def least_largest(off: Floats, slope: Floats, damping: Floats) -> Floats:
-    """(G, V) steps with which the largest of ``off`` (G, S, 3) + ``slope`` (G, S, 3, V) steps is least, damped."""
+    """(G, V) [m] steps with which the largest of ``off`` (G, S, 3) + ``slope`` (G, S, 3, V) steps is least, with the
+    ``damping`` (G,) of each: a share of the mean of its squared slopes."""
     groups, samples, _, free = slope.shape
     flat, side = slope.reshape(groups, 3 * samples, free), off.reshape(groups, 3 * samples, 1)
     given = np.ones((groups, samples))

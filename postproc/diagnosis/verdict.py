@@ -321,12 +321,6 @@ def _elsewhere(search: Search, last: Explained) -> tuple[float, int]:
     )
 
 
-def fails_elsewhere(search: Search) -> bool:
-    """Whether regions that were left out are off by clearly more than scatter and the uncertainty of the fit make."""
-    variance, counts = _elsewhere(search, search.explained)
-    return counts > 0 and variance > 1.0 + TOLERATED + EXCESS * np.sqrt(2.0 / counts)
-
-
 def _remaining_variance(search: Search, last: Explained) -> float:
     """The variance that remains, where the fit was or elsewhere, over the stated one."""
     return max(reduced_chi2_of(search, last)[0], _elsewhere(search, last)[0])
@@ -335,7 +329,7 @@ def _remaining_variance(search: Search, last: Explained) -> float:
 def more_remains(search: Search, patterns: Sequence[ResidualPattern]) -> bool:
     """Whether more than scatter remains of what was chosen, whose residual has clear ``patterns``."""
     known = search.linear.problem.known
-    if reduced_chi2_of(search, search.explained)[1] or (search.chosen and fails_elsewhere(search)):
+    if reduced_chi2_of(search, search.explained)[1]:
         return True
     return any(not known or one.share > FAINT for one in patterns)
 

@@ -35,7 +35,7 @@ FOLDS = 5
 POSE_OFF = "so are others of this pose, so the arm stood elsewhere: measure the pose again"
 """What it may be where a pose is off as a whole."""
 
-GAVE_WAY = "so are others under the largest loads on {}, so something gave way there"
+GAVE_WAY = "so are others under the largest loads on {}, so something yielded there"
 """The same where what is off goes with the load on a joint."""
 
 BESIDE_OTHERS = {"nothing_missing": "unknown", "named": "partly_named"}

@@ -317,10 +317,10 @@ CODES = define(
             "tool along a plane that the program states",
             meaning=(
                 "G53.1 and CYCLE800 bring the tool along the normal of the plane; how far it then turns about its own "
-                "axis is the machine's. It is taken as turned from the cell's orientation on the shortest way."
+                "axis is the machine's. It is taken as turned from the cell's orientation by the least angle."
             ),
             consequence="Another turn about the tool's axis is another pose of the arm, and another correction.",
-            action="Check in a simulation that the robot holds the tool so.",
+            action="Check in a simulation that the tool has this orientation.",
             example="`G68.2 X0 Y0 Z0 I0 J30 K0` and `G53.1`.",
         ),
         "SIN001": Code(

@@ -198,7 +198,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         *diagnostics(document, given, rows, tool, named, settings),
     ]
     if run.along_plane >= 0:
-        message = "the tool is taken as turned to the normal of the plane on the shortest way"
+        message = "the tool is taken as turned to the normal of the plane by the least angle"
         at = int(lines.line[run.along_plane])
         findings.append(Finding("GCO034", message, str(document.path), at, 1))
     if coordinates:

@@ -29,7 +29,7 @@ OTHERS = RefusalReason(
 )
 LEFT = RefusalReason(
     "GCO013",
-    "the tool is along a plane that is no longer in force, and no rotary axis states that it is back",
+    "the tool is along a plane that has ended, and no rotary axis states that it is back",
     "plane",
     "write the words of the rotary axes after the plane (G0 A0 C0)",
 )

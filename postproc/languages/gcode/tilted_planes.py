@@ -30,7 +30,7 @@ _NORMAL = np.array([2, 1, 0])
 """The axis normal to G17, G18, G19."""
 
 
-class Placed(NamedTuple):
+class PlaneMemory(NamedTuple):
     """What a frame of a plane remembers: the frame before it; whether it is a tilted one, along which the tool can be
     brought."""
 
@@ -42,7 +42,7 @@ def with_planes(shifts: Callable[[Event], ProgrammedFrame]) -> Callable[[Event],
     """The frame after a block of a Fanuc; ``shifts`` gives that after G52, G92 and G92.1."""
 
     def frame(event: Event) -> ProgrammedFrame:
-        placed = event.frame.memory if isinstance(event.frame.memory, Placed) else None
+        placed = event.frame.memory if isinstance(event.frame.memory, PlaneMemory) else None
         codes = set(event.codes)
         if codes.intersection(ENDED):
             return event.frame if placed is None else _ended(event.frame, placed)
@@ -52,7 +52,7 @@ def with_planes(shifts: Callable[[Event], ProgrammedFrame]) -> Callable[[Event],
             return replace(event.frame, tool=ToolAxis.NORMAL, rotary=np.full(3, np.nan))
         tilted = bool(codes.intersection(TILTED))
         if tilted or codes.intersection(ROTATED):
-            memory = Placed(event.frame, tilted) if placed is None else placed
+            memory = PlaneMemory(event.frame, tilted) if placed is None else placed
             if placed is not None or len(codes.intersection((*ROTATED, *TILTED))) > 1:
                 return replace(_unknown(event.frame), memory=memory)
             return replace(_tilted(event) if tilted else _rotated(event), memory=memory)
@@ -67,7 +67,7 @@ def _unknown(frame: ProgrammedFrame) -> ProgrammedFrame:
     return replace(frame, shift=np.full(6, np.nan))
 
 
-def _ended(frame: ProgrammedFrame, placed: Placed) -> ProgrammedFrame:
+def _ended(frame: ProgrammedFrame, placed: PlaneMemory) -> ProgrammedFrame:
     """After G69: the coordinates are those from before, and a tool that was brought along the plane stays there."""
     if frame.tool != ToolAxis.NORMAL:
         return replace(placed.before, rotary=None)

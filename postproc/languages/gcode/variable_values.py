@@ -78,7 +78,7 @@ class VariableValues:
 
     def _table(self, name: str) -> dict[str, float]:
         """Where the value of a variable is kept."""
-        return self._own if self._is_local(name) else self._shared
+        return self._own if self.is_local(name) else self._shared
 
     def _put(self, values: Mapping[str, float]) -> None:
         for name, value in values.items():
@@ -90,7 +90,7 @@ class VariableValues:
         self._shared.clear()
         self._own.clear()
 
-    def _is_local(self, name: str) -> bool:
+    def is_local(self, name: str) -> bool:
         known = self._local.get(name)
         if known is None:
             known = self._local[name] = self._belongs_to_part(name)

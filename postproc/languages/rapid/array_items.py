@@ -31,10 +31,10 @@ class _Chunk(tuple[Any, ...]):
 class ArrayItems(Sequence[Any]):
     """A tuple of many items, in its behaviour."""
 
-    __slots__ = ("_chunks", "_count")
+    __slots__ = ("_count", "chunks")
 
     def __init__(self, chunks: tuple[_Chunk, ...], count: int) -> None:
-        self._chunks, self._count = chunks, count
+        self.chunks, self._count = chunks, count
 
     def __len__(self) -> int:
         return self._count
@@ -51,40 +51,40 @@ class ArrayItems(Sequence[Any]):
         if not -self._count <= at < self._count:
             raise IndexError(at)
         chunk, place = divmod(at % self._count, CHUNK)
-        return self._chunks[chunk][place]
+        return self.chunks[chunk][place]
 
     def __iter__(self) -> Iterator[Any]:
-        return chain.from_iterable(self._chunks)
+        return chain.from_iterable(self.chunks)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, ArrayItems) and self._chunks == other._chunks
+        return isinstance(other, ArrayItems) and self.chunks == other.chunks
 
     def __hash__(self) -> int:
-        return hash(self._chunks)
+        return hash(self.chunks)
 
     def with_item(self, at: int, item: Any) -> ArrayItems:
         """The items with another one at a place that exists."""
         chunk, place = divmod(at, CHUNK)
-        old = self._chunks[chunk]
+        old = self.chunks[chunk]
         if old[place] is item:
             return self
         new = _Chunk((*old[:place], item, *old[place + 1 :]))
-        return ArrayItems((*self._chunks[:chunk], new, *self._chunks[chunk + 1 :]), self._count)
+        return ArrayItems((*self.chunks[:chunk], new, *self.chunks[chunk + 1 :]), self._count)
 
     def mapped(self, change: Change) -> ArrayItems:
         """The items as ``change`` gives them; itself where that gives them all back.  A chunk is asked once."""
         chunks = []
-        for chunk in self._chunks:
+        for chunk in self.chunks:
             if change not in chunk.answers:
                 new = _kept(chunk, _Chunk(tuple(map(change, chunk))))
                 chunk.answers[change] = None if new is chunk else new
             chunks.append(chunk.answers[change] or chunk)
-        changed = _kept(self._chunks, tuple(chunks))
-        return self if changed is self._chunks else ArrayItems(changed, self._count)
+        changed = _kept(self.chunks, tuple(chunks))
+        return self if changed is self.chunks else ArrayItems(changed, self._count)
 
     def first(self, find: Change) -> Any:
         """The first that ``find`` gives of an item and that is not None.  A chunk is asked once."""
-        for chunk in self._chunks:
+        for chunk in self.chunks:
             if find not in chunk.answers:
                 chunk.answers[find] = next(
                     (found for item in chunk if (found := find(item)) is not None), None
@@ -97,9 +97,9 @@ class ArrayItems(Sequence[Any]):
         """The items joined one by one with those of as many others; ``join`` gives back one that is met by itself."""
         chunks = tuple(
             mine if mine is others else _kept(mine, _Chunk(tuple(map(join, mine, others))))
-            for mine, others in zip(self._chunks, other._chunks, strict=True)
+            for mine, others in zip(self.chunks, other.chunks, strict=True)
         )
-        return self if _kept(self._chunks, chunks) is self._chunks else ArrayItems(chunks, self._count)
+        return self if _kept(self.chunks, chunks) is self.chunks else ArrayItems(chunks, self._count)
 
 
 def _kept(old: Kept, new: Kept) -> Kept:

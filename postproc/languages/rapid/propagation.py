@@ -99,7 +99,7 @@ class Propagation:
         self.rows = 0
         self.waited: set[Source] = set()
         self._budget = StepBudget(module)
-        self._runner = FlowRunner(self._after, lambda: len(self._names.aliased))
+        self._runner = FlowRunner(self.after_block, lambda: len(self._names.aliased))
 
     def run(self) -> None:
         """Follows the program from main, and every routine that nothing in the file calls.  Raises TooLong."""
@@ -193,7 +193,9 @@ class Propagation:
         finally:
             self._names.active.pop()
 
-    def _after(self, graph: RoutineGraph, at: int, state: ProgramState) -> list[tuple[int, ProgramState]]:
+    def after_block(
+        self, graph: RoutineGraph, at: int, state: ProgramState
+    ) -> list[tuple[int, ProgramState]]:
         """Where a block leads, and what holds there."""
         block = graph.blocks[at]
         for step in block.steps:
