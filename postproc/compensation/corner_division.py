@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
-from postproc.base.geometry import Placed, PoseRows, Poses
+from postproc.base.geometry import Placed, PoseRows, Poses, lengths
 from postproc.compensation.corner_points import ChosenPoints
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.divisible_motions import arc_normals
@@ -17,6 +17,9 @@ from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.rounded_path import original
 from postproc.compensation.subdivision import CornerFits, Subdivision, subdivided_motions
 from postproc.toolpath import Role
+
+FLAT = 1e-6
+"""[m] Height of an arc over its chord: a digit of a program."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,15 @@ class CornerDivision:
         if len(self.arcs):
             division = self._rounded(task, division, poses)
         return replace(self, division=division, poses=poses)
+
+    @property
+    def flat(self) -> Bools:
+        """(G,) corners whose points leave an arc so flat that three points as they are written define no circle."""
+        found = np.zeros(len(self.group_start) - 1, bool)
+        radius = lengths(self.division.command[self.arcs].position - self.division.centre[self.arcs])
+        arcs = self.arcs[radius * (1.0 - np.cos(0.5 * self.division.sweep[self.arcs])) < FLAT]
+        found[self.group[np.isin(self.motion, arcs) | np.isin(self.motion + 1, arcs)]] = True
+        return found
 
     def _rounded(self, task: CompensationProblem, division: Subdivision, poses: Poses) -> Subdivision:
         """The division with its arcs through the moved points; the middle of each moves as much as both do."""

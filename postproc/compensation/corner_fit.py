@@ -162,7 +162,7 @@ def _fit_alone(
         still = more[2] > 1.0 / ALLOWED
         if still.sum() < beyond.sum() and more[2].max() <= after.max():
             chosen, fitted, after = more
-    better = after < BETTER * chosen.before
+    better = (after < BETTER * chosen.before) & ~fitted.flat
     if not better.any():
         return result, division
     if not better.all():  # without the points of the others the rest is where it was
@@ -196,7 +196,7 @@ def _fit_ramps(
         at_vertex = part.share[chosen.corner] == 1.0  # else where the ramp ends
         taken = np.isin(part.source[chosen.corner] + at_vertex, anyhow)
         after = _largest(stated, fitted, taken)
-        bad = ~(after <= enough) & ~taken
+        bad = (~(after <= enough) & ~taken) | fitted.flat
         if not bad.any():
             fits = fitted.division.fits
             assert fits is not None
