@@ -224,7 +224,7 @@ def decoys(model: StiffnessModel, campaign: Campaign, mine: Candidate) -> list[C
         places = [one.name for one in joints] if mine.joint == EVERY else [mine.joint]
         return [_decoy(model, q, OtherWave(joints, (order,)), place) for place in places for order in ORDERS]
     if campaign.readings.deflection and mine.name in (JointOffset.name, LinkGeometry.name):
-        # where axes lie moves no difference but by the lever of what gives way
+        # where axes lie moves no difference but by the lever of what deflects
         pairs = [(i, k) for i in range(len(joints)) for k in (i - 1, i + 1) if 0 <= k < len(joints)]
         return [_decoy(model, q, LeaningCompliance(joints, i, k), joints[i].name) for i, k in pairs]
     if mine.joint == EVERY:

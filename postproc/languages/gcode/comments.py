@@ -53,13 +53,13 @@ def remarks(
     alone = np.ones(0, np.bool_)
     if len(lines):
         alone = ~np.isin(lines, source.blocks.line[source.blocks.wordy])
-    speaking, others, doubted = [], [], []
-    for (start, stop), number, row, own, doubt in zip(
+    speaking, others, conditional = [], [], []
+    for (start, stop), number, row, own, may_pass in zip(
         spans.tolist(),
         lines.tolist(),
         rows.tolist(),
         alone.tolist(),
-        _doubted(at, alone, execution, flow).tolist(),
+        _conditional(at, alone, execution, flow).tolist(),
         strict=True,
     ):
         said = _text(raw[start:stop])
@@ -67,15 +67,15 @@ def remarks(
             continue
         if SPEAKS.match(said):
             speaking.append(Annotation(row, said, number))
-            doubted.append(doubt)
+            conditional.append(may_pass)
         elif said and (own or meant_to_speak(said)):
             others.append(Annotation(row, said, number))
     first = head(raw)
-    varying = _varying(speaking, doubted, len(steps))
+    varying = _varying(speaking, conditional, len(steps))
     return Remarks(tuple(speaking), tuple(others), marker, Span(0, first, first), varying)
 
 
-def _doubted(at: Ints, alone: Bools, execution: Execution, flow: ExecutionFlow) -> Bools:
+def _conditional(at: Ints, alone: Bools, execution: Execution, flow: ExecutionFlow) -> Bools:
     """(C,) comments, at steps ``at`` (C,), that the run may pass or not; alone (C,): no words are in their line."""
     n = len(flow.reason)
     uncertain = np.append(np.isin(flow.reason, (FlowReason.FLOW, FlowReason.DELETED)), False)
@@ -90,15 +90,15 @@ def _doubted(at: Ints, alone: Bools, execution: Execution, flow: ExecutionFlow) 
     return np.asarray(np.where(alone, before[at], uncertain[at]))
 
 
-def _varying(speaking: list[Annotation], doubted: list[bool], count: int) -> Bools:
+def _varying(speaking: list[Annotation], conditional: list[bool], count: int) -> Bools:
     """(N,) see ``Remarks.varying``: behind a comment that may be passed or not, up to one that is."""
     edge = np.zeros(count + 1, np.int32)
     for word in ("FORCE", "COMPENSATE"):
         since, said = -1, ""
-        for one, doubt in zip(speaking, doubted, strict=True):
+        for one, may_pass in zip(speaking, conditional, strict=True):
             if not one.text.upper().startswith(word):
                 continue
-            if not doubt:
+            if not may_pass:
                 if since >= 0:
                     edge[since] += 1
                     edge[one.row] -= 1

@@ -209,5 +209,5 @@ def _result(run: RunFlow, stop: int, followed: bool, own: int | None = None) -> 
         frozenset(run.missing),
         np.array(run.jumped, np.int64),
         np.array(run.reached, np.int64).reshape(-1, 2),
-        np.array(run.doubtful, np.int64).reshape(-1, 2),
+        np.array(run.conditional, np.int64).reshape(-1, 2),
     )

@@ -208,7 +208,7 @@ class RunFlow(RunCalls):
         """A construct that may run or not, once or often."""
         self.escape(around.start, around.stop + 1)
         self.kill(around.start, around.stop + 1)
-        self.doubtful.append((self.count + 1, self.count + around.stop - around.start))
+        self.conditional.append((self.count + 1, self.count + around.stop - around.start))
         self.perhaps_range(around.start, around.stop + 1)
         return around.stop + 1
 
@@ -299,7 +299,7 @@ class RunFlow(RunCalls):
         if self.labels.between(start, stop):
             raise NotFollowed
         self.kill(start, stop)
-        self.doubtful.append((self.count + 1, self.count + stop - start))
+        self.conditional.append((self.count + 1, self.count + stop - start))
         self.emit(start, start + 1)
         self.perhaps_range(start + 1, stop)
         self.entered.append(self.count)

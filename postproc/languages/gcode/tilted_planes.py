@@ -3,7 +3,7 @@
 G68 turns the coordinates about the axis normal to the plane, at a centre, and leaves the tool as it is.  G68.2 states
 the origin of a plane and its angles I J K about Z, the new X and the new Z; G53.1 then brings the tool along its Z.
 CYCLE800 turns axis by axis, in the order that its mode states, and brings the tool along Z.  The tool's spin about its
-axis is then the machine's: the tool is turned from its orientation in the cell on the shortest way, as where a vector
+axis is then the machine's: the tool is turned from its orientation in the cell by the least angle, as where a vector
 states its direction.  Centres that are not stated, steps (G91), and what the control's parameters decide are not read.
 """
 
