@@ -679,7 +679,8 @@ def test_what_is_written_reads_back(tmp_path_factory, r):
         assert getattr(back, name) == getattr(r, name), name
     for name in ("target", "session", "repeat"):
         assert getattr(back, name).tolist() == getattr(r, name).tolist(), name
-    assert {finding.code for finding in back.findings} <= {"MEA006"}
+    # a drawn tool or target may lie so close to its frame that its lengths look like metres (MEA014)
+    assert {finding.code for finding in back.findings} <= {"MEA006", "MEA014"}
     half = 0.5001
     units = np.array([MM if slides else DEG for _, slides in r.joints])
     assert same(back.q / units, r.q / units, half * 1e-4)
