@@ -56,5 +56,5 @@ class PlacesBeside:
             share[tools[active]] = np.clip((at - begins[part]) / np.maximum(length[part], settled), 0.0, 1.0)
             gap = ahead(tools[active])
             brackets.narrow(active, at, -gap)
-            going: Bools = np.abs(gap) > settled
+            going: Bools = (np.abs(gap) > settled) & brackets.apart(active)
             active = active[going]
