@@ -137,8 +137,8 @@ def _put_in_place(
             synced = {}
             for at, content in files.items():
                 synced[at] = pool.submit(_sync, _write(ready[at], content))
-            for at, done in synced.items():
-                done.result()
+            for at in synced:
+                synced[at].result()
         still()
         order = sorted(files, key=lambda path: path == last)
         for at in reversed(order):
