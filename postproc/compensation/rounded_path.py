@@ -372,15 +372,18 @@ def _moved(task: CompensationProblem, row: Ints, share: Floats, step: Floats) ->
     """The places (S,) that lie by ``step`` (S,) [m] farther along the program's path than row (S,), share (S,); no
     farther than the motions before and after them, of the same cut."""
     desired_path, path = task.desired_path, task.toolpath
-    length = np.maximum(desired_path.length, NEAREST)
-    share = share + step / length[row]
+
+    def length(rows: Ints) -> Floats:
+        return np.maximum(desired_path.length[rows], NEAREST)
+
+    share = share + step / length(row)
     for side in (1, -1):
         other = np.clip(row + side, 0, len(path) - 1)
         over = (share > 1.0) if side > 0 else (share < 0.0)
         later = other if side > 0 else row
         can = over & (other != row) & desired_path.traceable[other] & path.continues[later]
         can &= task.carries[other] & (path.tool[other] == path.tool[row])
-        beyond = ((share - 1.0) if side > 0 else -share) * length[row] / length[other]
+        beyond = ((share - 1.0) if side > 0 else -share) * length(row) / length(other)
         share = np.where(can, beyond if side > 0 else 1.0 - beyond, share)
         row = np.where(can, other, row)
     return row, np.clip(share, 0.0, 1.0)

@@ -213,9 +213,8 @@ def _compensate(request: Request, stage: Stage) -> Report:
     }
     if part is not None:
         files |= {path: part_mesh(part, end) for path, end in meshes.items()}
-    ready.inputs.refuse_changed()
     release_free_memory()
-    write_atomically(files, target, ready.inputs.refuse_changed)  # writing takes its time as well
+    write_atomically(files, target, ready.inputs.refuse_changed)
     return report
 
 
