@@ -78,11 +78,8 @@ def cuts_not_improved(
     cuts, place = np.unique(result.cut[rows], return_inverse=True)
 
     def largest(values: Floats, at: Ints) -> Floats:
-        maxima, order = np.zeros(len(cuts)), np.argsort(at, kind="stable")
-        cut = at[order]
-        first = np.flatnonzero(np.diff(cut, prepend=-1))
-        if len(first):
-            maxima[cut[first]] = np.fmax(np.fmax.reduceat(values[order], first), 0.0)
+        maxima = np.zeros(len(cuts))
+        np.fmax.at(maxima, at, values)
         return maxima
 
     def mean_square(values: Floats) -> Floats:
