@@ -13,6 +13,7 @@ from postproc.base.findings import Finding, Refusal
 from postproc.cell import Cell, MotionFrames
 from postproc.process.force_comments import marked_air, read_annotations
 from postproc.process.stated_forces import FORM, NotAForce, StatedForces, parse_force
+from postproc.process.stock.stated_stock import has_stock
 from postproc.process.wrenches import Wrenches, turn_to_robot_axes
 from postproc.toolpath import Toolpath
 
@@ -148,7 +149,6 @@ class _ForceRequest:
     def process(self, path: Path) -> SourcedForces:
         from postproc.process.operations import process_forces  # these are loaded where there is a process
         from postproc.process.stock.compiled import check_compiler
-        from postproc.process.stock.stock_section import has_stock
 
         self.no_offset("the force is computed from a process")
         if has_stock(path):
