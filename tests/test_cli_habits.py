@@ -128,7 +128,7 @@ def test_a_small_program_loads_what_it_needs(tmp_path):
         "postproc.process.stock.codes",
         "postproc.process.stock.stated_stock",
     }
-    assert not {"pyexpat", "postproc.process.operations", "postproc.part.part_figures"} & set(loaded)
+    assert not {"pyexpat", "postproc.part.part_figures"} & set(loaded)
     assert "postproc.cli.program" in loaded
     assert not {f"postproc.cli.{name}" for name in COMMANDS} & set(loaded) - {
         "postproc.cli.program",
