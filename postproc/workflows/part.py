@@ -10,6 +10,7 @@ from postproc.base.arrays import Ints
 from postproc.base.findings import Finding
 from postproc.base.units import MM
 from postproc.compensation.subdivision import Subdivision
+from postproc.part import codes as codes
 from postproc.workflows.force_log import logged_force_findings
 from postproc.workflows.preparation import Prepared
 
