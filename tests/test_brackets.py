@@ -36,16 +36,3 @@ def test_some_of_them_alone() -> None:
     np.testing.assert_allclose(brackets.secants(np.array([1, 2])), [0.5, 0.75])
     brackets.narrow(np.array([2]), np.array([0.75]), np.array([-1.0]))
     np.testing.assert_allclose(brackets.secants(np.arange(3)), [0.5, 0.5, 0.875])
-
-
-def test_ends_that_have_come_together_at_a_leap_are_not_apart() -> None:
-    """Between places of which the one is before a leap and the other behind it none is zero."""
-    brackets = Brackets(np.zeros(2), np.ones(2), np.array([-1.0, -1.0]), np.array([3.0, 1.0]))
-    every = np.arange(2)
-    assert brackets.apart(every).all()
-    for _ in range(24):
-        at = brackets.secants(every)
-        brackets.narrow(every, at, np.array([-1.0 if at[0] < 0.37 else 3.0, -1.0]))
-        if not brackets.apart(np.array([1]))[0]:
-            break
-    assert brackets.apart(every).tolist() == [True, False]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.arrays import Floats, Ints
 
 NEAREST = 1e-12
-"""Values, and places [m], that differ by less do not: the one place is taken."""
+"""Values that differ by less do not: the one place is taken."""
 
 
 class Brackets:
@@ -24,12 +24,6 @@ class Brackets:
         (low, high), (below, above) = ([v[numbers] for v in pair] for pair in (self._ends, self._values))
         at = low - below * (high - low) / np.maximum(above - below, NEAREST)
         return np.clip(at, low, high)
-
-    def apart(self, numbers: Ints) -> Bools:
-        """(K,) where the ends of ``numbers`` (K,) are apart by more than ``NEAREST``: at a leap they come together, and
-        no place between them is zero."""
-        low, high = (ends[numbers] for ends in self._ends)
-        return np.asarray(high - low > NEAREST)
 
     def narrow(self, numbers: Ints, at: Floats, value: Floats) -> None:
         """The functions ``numbers`` (K,) have the values (K,) at the places ``at`` (K,).  The value of an end that
