@@ -55,7 +55,7 @@ class PlacesBeside:
             part = np.clip(np.searchsorted(begins, at, "right") - 1, 0, len(length) - 1)
             along = np.clip((at - begins[part]) / np.maximum(length[part], settled), 0.0, 1.0)
             # beside a leap the ends come together, and what is to be asked for is the same place again
-            new = ((part, along) != asked[:, active]).any(axis=0)
+            new = (np.stack((part, along)) != asked[:, active]).any(axis=0)
             some = active[new]
             if len(some):
                 asked[:, some] = part[new], along[new]
