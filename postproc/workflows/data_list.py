@@ -7,6 +7,7 @@ from pathlib import Path
 from postproc.base.document import Document
 from postproc.base.findings import Finding, Refusal
 from postproc.base.read_files import read_text_file
+from postproc.languages import codes as codes
 
 
 def read_controller_data(path: Path) -> Document:
