@@ -89,7 +89,9 @@ def ramped(chance):  # type: ignore[no-untyped-def]
         near_end = length - chance.choice([0.7, 1.3, 2.1, 9.0]) * MM
         some = [near_end, near_end - chance.choice([0.6, 1.1, 1.7, 7.0]) * MM,
                 chance.choice([0.7, 1.3, 2.1, 9.0]) * MM]  # fmt: skip
-        ends += [(row, at) for at in sorted(chance.choice(some, chance.integers(0, 4), replace=False)) if at > 0]
+        ends += [
+            (row, at) for at in sorted(chance.choice(some, chance.integers(0, 4), replace=False)) if at > 0
+        ]
     row = np.array([one[0] for one in ends], int)
     step = np.zeros((len(ends), 6))
     step[:, 1] = chance.choice([5.0, 60.0, -300.0], len(ends))

@@ -84,7 +84,9 @@ def test_corners_that_were_thought_smaller_get_points_beside_their_own(part, exp
         )
     result = correct(job)
     plain = subdivide(job, result, FREE)
-    assert largest_error(job, plain, [2, 3], blend, 9 * MM) == pytest.approx(part * 0.9 * job.tolerance, rel=0.02)
+    assert largest_error(job, plain, [2, 3], blend, 9 * MM) == pytest.approx(
+        part * 0.9 * job.tolerance, rel=0.02
+    )
     division = fit_corners(job, result, plain, FREE)[1]
     assert division.inserted == plain.inserted + 2
     assert largest_error(job, division, [2, 3], blend, 9 * MM) < 0.9 * job.tolerance

@@ -14,7 +14,9 @@ from postproc.compensation.summits import NEARLY, SUMMITS, summits
 def test_summits_in_loops() -> None:
     chance = np.random.default_rng(0)
     for _ in range(300):
-        sizes = chance.integers(0, 12, (int(chance.integers(1, 4)), int(chance.integers(1, 16)))).astype(float)
+        sizes = chance.integers(0, 12, (int(chance.integers(1, 4)), int(chance.integers(1, 16)))).astype(
+            float
+        )
         if chance.random() < 0.1:
             sizes[0, -1] = np.inf
         row, number = summits(sizes)
