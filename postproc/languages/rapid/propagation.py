@@ -31,7 +31,8 @@ from postproc.languages.rapid.instructions import (
     MotionForm,
     is_motion,
 )
-from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read, override_of, waits_at
+from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read, waits_at
+from postproc.languages.rapid.motion_modes import MODES_OF_MOTIONS, set_mode
 from postproc.languages.rapid.program_state import ProgramState
 from postproc.languages.rapid.routine_entries import program_entries, run_again, run_aside, value_at_start
 from postproc.languages.rapid.routine_graph import RapidStep, RoutineGraph
@@ -50,7 +51,7 @@ from postproc.languages.rapid.syntax_tree import (
     Remark,
 )
 from postproc.languages.rapid.values import UnknownData, Value, plain, replaced, truth_of
-from postproc.toolpath import ArcFrame, Kind, OrientationMode
+from postproc.toolpath import Kind
 
 OTHER = MotionForm(Kind.OTHER)
 _SETTINGS = frozenset([b"TOOLDATA", b"WOBJDATA", b"SPEEDDATA", b"ZONEDATA"])
@@ -198,8 +199,7 @@ class Propagation:
     ) -> list[tuple[int, ProgramState]]:
         """Where a block leads, and what holds there."""
         block = graph.blocks[at]
-        for step in block.steps:
-            self._step(step, state)
+        self._steps(block.steps, state)
         if block.condition is None:
             return [(block.follow, state)]
         self._functions(block.condition, state)
@@ -207,6 +207,23 @@ class Propagation:
         if holds is None:
             return [(block.follow, state), (block.otherwise, state)]
         return [(block.follow if holds else block.otherwise, state)]
+
+    def _steps(self, steps: list[RapidStep], state: ProgramState) -> None:
+        """Runs statements.  A call that is there again and again is passed once it changes nothing: what it does then
+        is what it did before."""
+        called, count, settled = b"", 0, False
+        for step in steps:
+            name = step.name if type(step) is Instruction and not step.arguments else b""
+            if not name or name != called or is_motion(name):
+                called, count, settled = name, 1, False
+                self._step(step, state)
+            elif settled:
+                self._budget.take(step)
+            else:
+                count += 1
+                before = None if count & (count - 1) else state.copy()
+                self._step(step, state)
+                settled = before is not None and state.is_same(before)
 
     def _step(self, step: RapidStep, state: ProgramState) -> None:
         self._budget.take(step)
@@ -289,25 +306,11 @@ class Propagation:
                 self._note_reading(step.start, state)
         elif name in RESTORING:
             state.displaced -= frozenset(RESTORING[name])
-        elif name in (b"CONFL", b"CONFJ"):
-            given = options & {b"ON", b"OFF"}
-            checks = b"ON" in given if len(given) == len(step.arguments) == 1 else None
-            setattr(state, "checks_linear" if name == b"CONFL" else "checks_joint", checks)
-        elif name == b"SINGAREA":
-            modes = {frozenset([b"OFF"]): OrientationMode.VAR, frozenset([b"WRIST"]): OrientationMode.JOINT}
-            state.orientation = modes.get(frozenset(options), OrientationMode.UNKNOWN)
-        elif name == b"CIRPATHMODE":
-            arcs = {frozenset([b"PATHFRAME"]): ArcFrame.PATH, frozenset([b"OBJECTFRAME"]): ArcFrame.BASE}
-            state.arc = arcs.get(frozenset(options), ArcFrame.UNKNOWN)
-        elif name == b"SPEEDREFRESH":
-            state.override = None
-        elif name == b"VELSET":
-            state.override = override_of(step.arguments, self._evaluator(state))
+        elif name in MODES_OF_MOTIONS:
+            set_mode(step, state, self._evaluator(state))
         elif name in WRITERS:
             self._change(step.arguments, state)
-        elif name in (b"ACTUNIT", b"DEACTUNIT"):
-            pass
-        elif name not in HARMLESS:
+        elif name not in HARMLESS and name not in (b"ACTUNIT", b"DEACTUNIT"):
             self._unread_call(step, state, moves=True)
         elif name.startswith(b"WAIT"):
             self._change(tuple(a for a in step.arguments if a.name), state)
@@ -358,10 +361,12 @@ class Propagation:
 
     def _call(self, routine: RapidRoutine, step: Instruction, state: ProgramState) -> None:
         """Runs a routine of the file with its arguments."""
-        deep = len(self._names.active) >= DEEPEST or not self._budget.has_calls
-        if deep or routine in self._names.active or self.is_unclear(routine):
-            self._again |= self._effects.of(routine.name).routines
-            self._unread_call(step, state, moves=True)
+        deep = len(self._names.active) >= DEEPEST
+        unclear = deep or routine in self._names.active or self.is_unclear(routine)
+        if unclear or not self._budget.take_call():
+            reach = self._effects.of(routine.name)
+            self._again |= reach.routines
+            self._unread_call(step, state, moves=unclear or not reach.routines.isdisjoint(self.usage.moves))
             self._lose_effects(routine.name, state)
             return
         resumes = leaving_words(self._names.active[-1].handlers)
