@@ -39,6 +39,16 @@ def test_a_gap_is_looked_for_where_the_fitted_weights_put_its_teeth():
     assert sorted(one.effect for one in verdict.named) == sorted(case.effects)
 
 
+@pytest.mark.slow
+def test_all_weights_of_an_arm_may_be_a_load_and_a_wave():
+    """Both together move readings as weights do, with fewer parameters; `link_gravity` alone was named."""
+    case, verdict = told("pair", 0, 13000)
+    assert case.effects == ("payload", "transmission_error")
+    assert verdict.word == "ambiguous"
+    sets = [{c.name for c in several} for several in verdict.alternatives]
+    assert sorted(map(sorted, sets)) == [["link_gravity", "payload"], ["link_gravity", "transmission_error"]]
+
+
 def left_out(value, known=True, at=1.0):
     """The ratio of a group that pose 0 shows, pose 1 a little, and ``value`` is how large it is there, in standard
     deviations of a coordinate; pose 1 reads as if it were ``at`` times as large."""
