@@ -4,11 +4,21 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_imitations import told
+from blind.arm import model_of
+from blind.cases import cases, made
 
+from postproc.diagnosis.approach_sides import diagnose_sides
 from postproc.diagnosis.held_out import worst_ratio
+from postproc.identification.campaign import Campaign
 
 POSES = 20
+
+
+def told(row, number, seed):
+    """What is said of the readings of a case of the blind benchmark, sides of approach stated or not."""
+    (case,) = [one for one in cases(row, number + 1, seed) if one.number == number]
+    run = made(case)
+    return case, diagnose_sides(Campaign(run.readings), model_of(run.robot))[0].verdict
 
 
 @pytest.mark.parametrize(
