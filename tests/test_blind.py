@@ -290,6 +290,17 @@ def test_tables_count_every_run(tmp_path):
     assert (tmp_path / "confusion.png").stat().st_size > 10_000
 
 
+@pytest.mark.parametrize(("other", "there"), [("link_gravity", True), ("link_compliance", False)])
+def test_a_set_counts_by_itself(other, there):
+    """A set has a truth in it also where another effect was missed; another joint's is none."""
+    two = [{"effect": name, "joint": "A2"} for name in (other, "joint_compliance")]
+    record = {
+        "truth": [["backlash", "A3"], ["link_gravity", ""], ["link_compliance", "A3"]],
+        "answer": {"alternatives": [two]},
+    }
+    assert table.has_true_sets(record) == there
+
+
 def test_intervals_are_counted_by_row_and_kind_of_parameter():
     inside, outside_, unknown = ([True, held, 1.0, 0.1, 1.0, 1.0] for held in (True, False, None))
     records = [

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from postproc.base.arrays import Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints
 from postproc.diagnosis.search_result import Search
 from postproc.diagnosis.selection import Explained, Problem, scatter
 
@@ -81,38 +81,59 @@ def _with_expectations(
 
 def worst_ratio(search: Search, last: Explained, group: int, part: Ints) -> float:
     """The largest residual of a pose left out with the group, over that without it; part (R,): as of
-    ``held_out_gain``.  Where the scatter is known, what it makes of the largest pose is no growth."""
+    ``held_out_gain``.  Where the scatter is known, what it makes of the largest pose is no growth; nor is it where each
+    pose is as near as its prediction is certain: without the few poses that show a parameter the others hardly
+    determine it, and the truth predicts them badly.
+    """
     from scipy.special import chdtri
 
-    linear = search.linear
+    linear, known = search.linear, search.linear.problem.known
     rows = len(linear.residual) - linear.priors
     of = np.append(np.repeat(part, rows // len(part)), np.full(linear.priors, -1))
     pose = np.repeat(search.base.campaign.pose, rows // len(part))
 
-    def largest(groups: Sequence[int]) -> float:
+    def predicted(groups: Sequence[int]) -> Iterator[tuple[Bools, Floats, Floats]]:
         matrix = np.concatenate([linear.common, *(linear.columns[g] for g in groups)], axis=1)
-        away = _left_out(matrix, linear.residual, of)[:rows]
-        return float(np.sqrt(np.bincount(pose, away**2).max()))
+        for on, away, b in _left_out(matrix, linear.residual, of):
+            yield on[:rows], away, b
+
+    def largest(groups: Sequence[int]) -> float:
+        squares = np.zeros(int(pose.max()) + 1)
+        for on, away, _ in predicted(groups):
+            np.add.at(squares, pose[on], away**2)
+        return float(np.sqrt(squares.max()))
 
     counts = np.bincount(pose[linear.residual[:rows] != 0.0], minlength=1).max()
-    floor = (
-        np.sqrt(chdtri(counts, SCATTERS / search.base.campaign.poses)) if search.linear.problem.known else 0.0
-    )
+    floor = np.sqrt(chdtri(counts, SCATTERS / search.base.campaign.poses)) if known else 0.0
     without = max(largest([g for g in last.groups if g != group]), floor)
-    return max(largest(last.groups), floor) / without if without > 0 else 1.0
+    ratio = max(largest(last.groups), floor) / without if without > 0 else 1.0
+    if ratio > 1.0 and all(_surprise(away, b, pose[on]) <= floor for on, away, b in predicted(last.groups)):
+        return 1.0
+    return float(ratio)
 
 
-def _left_out(matrix: Floats, target: Floats, part: Ints) -> Floats:
-    """(n,) residuals of ``target`` (n,), each part predicted from the others by ``matrix`` (n, k)."""
+def _left_out(matrix: Floats, target: Floats, part: Ints) -> Iterator[tuple[Bools, Floats, Floats]]:
+    """Of each part of ``target`` (n,), predicted from the others by ``matrix`` (n, k): where it is (n,), what remains
+    (m,), and b (m, k): the covariance of that is 1 + b b'."""
     size = np.linalg.norm(matrix, axis=0)
     scaled = matrix[:, size > 0] / size[size > 0]
-    whole, aim, away = scaled.T @ scaled, scaled.T @ target, np.zeros(len(target))
+    whole, aim = scaled.T @ scaled, scaled.T @ target
     for k in np.unique(part[part >= 0]):
         out = scaled[part == k]
         value, vector = np.linalg.eigh(whole - out.T @ out)
         root = vector / np.sqrt(np.maximum(value, SEEN))
-        away[part == k] = target[part == k] - out @ (root @ (root.T @ (aim - out.T @ target[part == k])))
-    return away
+        b = out @ root
+        yield part == k, target[part == k] - b @ (root.T @ (aim - out.T @ target[part == k])), b
+
+
+def _surprise(away: Floats, b: Floats, pose: Ints) -> float:
+    """The largest of what remains ``away`` (m,) at any ``pose`` (m,), in standard deviations of its prediction, whose
+    covariance is 1 + ``b`` b'."""
+    largest = 0.0
+    for one in np.unique(pose):
+        own, mine = away[pose == one], b[pose == one]
+        largest = max(largest, float(own @ np.linalg.solve(np.eye(len(own)) + mine @ mine.T, own)))
+    return float(np.sqrt(largest))
 
 
 def _expected(problem: Problem, last: Explained, group: int) -> Floats:

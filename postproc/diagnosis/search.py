@@ -21,6 +21,7 @@ from postproc.diagnosis.selection import (
     problem,
     selected,
 )
+from postproc.effects import ComplianceLaw
 from postproc.effects.joint_offset import JointOffset
 from postproc.effects.link_geometry import LinkGeometry
 from postproc.identification.campaign import Campaign
@@ -91,12 +92,14 @@ def search(fits: ChoiceFits, banned: Sequence[Key] = ()) -> Search:
     shown = [c for c in every if is_visible(c, weights) and c.key not in banned]
     hidden = tuple(c for c in every if not is_visible(c, weights))
     while True:
+        if chosen:
+            shown = _on_fitted_sides(campaign, fitted, shown)
         linear = _linear(campaign, base, weights, fitted, chosen, shown)
         if not chosen:
             shown = list(linear.candidates)
         before = {c.key for c in chosen}
         start = [i for i, c in enumerate(linear.candidates) if c.key in before]
-        sums = {i for i, c in enumerate(linear.candidates) if c.joint == EVERY and c.name not in EXACT}
+        sums = {i for i, c in enumerate(linear.candidates) if _is_sum(c)}
         selection = selected(linear.problem, range(len(linear.candidates)), start, sums)
         now = tuple(linear.candidates[g] for g in selection.groups)
         keys = frozenset(c.key for c in now)
@@ -117,6 +120,36 @@ def search(fits: ChoiceFits, banned: Sequence[Key] = ()) -> Search:
         now = tuple(as_started[c.key] if c.only else c for c in now)
         chosen, fitted = _confirmed(fits, now, shown)
         weights = limit_shared_scatter(base, fitted)
+
+
+def _on_fitted_sides(campaign: Campaign, fitted: Fit, shown: Sequence[Candidate]) -> list[Candidate]:
+    """The candidates, those of gaps with their columns where ``fitted`` has the loads of the joints: weights that stood
+    in for a missing effect had put teeth on the other side."""
+    gaps = [c for c in shown if _is_gap(c)]
+    if not gaps:
+        return list(shown)
+    model, nuisances = fitted.model, fitted.point.nuisances
+    new = {c.key: c for c in candidates(campaign, model, nuisances, by_direction=True, near=fitted.point)}
+    moved: dict[Key, Candidate] = {}
+    for c in gaps:
+        there = new.get(c.key)
+        places = {} if there is None else {u.parameter.name: k for k, u in enumerate(there.unknowns)}
+        at = [places[u.parameter.name] for u in c.unknowns if u.parameter.name in places]
+        if there is not None and len(at) == len(c.unknowns):
+            moved[c.key] = replace(c, columns=there.columns[:, :, at])
+    return [moved.get(c.key, c) for c in shown]
+
+
+def _is_sum(candidate: Candidate) -> bool:
+    """Whether a candidate moves several joints at once, so that what others do on one each may look like it: waves of
+    all gears, or all weights of an arm, which are also a load on the flange and a wave of one gear together."""
+    joints = {u.parameter.joint for u in candidate.unknowns} - {""}
+    return candidate.name not in EXACT and (candidate.joint == EVERY or len(joints) > 1)
+
+
+def _is_gap(candidate: Candidate) -> bool:
+    """Whether the load of a joint decides on which side of a gap it lies."""
+    return candidate.effect.by_direction and isinstance(candidate.effect, ComplianceLaw)
 
 
 def drop_confounded(

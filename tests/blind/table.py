@@ -11,6 +11,7 @@ from scipy.stats import binomtest
 
 from .cases import POSES, ROWS, SNRS
 from .hidden import EVERY, OUTSIDE
+from .verdicts import named
 
 Records = Sequence[dict]
 
@@ -64,6 +65,13 @@ def is_named(record: dict) -> bool:
 def is_careful(record: dict) -> bool:
     """Whether nothing was named that is not there."""
     return record["outcome"] in ("exact", "ambiguous", "undecided", "missed", "unseen")
+
+
+def has_true_sets(record: dict) -> bool:
+    """Whether each set of equal explanations has one in it that is there."""
+    truth = {tuple(pair) for pair in record["truth"]}
+    sets = [{named(c["effect"], c["joint"] or "") for c in of} for of in record["answer"]["alternatives"]]
+    return all(of & truth for of in sets)
 
 
 def is_settled(record: dict) -> bool:
@@ -122,6 +130,15 @@ def matrix(records: Records) -> list[str]:
                 if r["answer"]["verdict"] == "ambiguous"
             ],
             lambda r: r["outcome"] in ("ambiguous", "undecided"),
+        ),
+        (
+            "  a truth in each set, whatever else is missed",
+            [
+                r
+                for r in at(["single", "decoy", "pair", "triple"], 0.5)
+                if r["answer"]["verdict"] == "ambiguous"
+            ],
+            has_true_sets,
         ),
         (
             "compensator named, 15 poses, 0.05 mm",
