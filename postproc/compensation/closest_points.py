@@ -5,13 +5,17 @@ other.  Where lines as short as they may be decide how near a polygon comes, tha
 each step is a linear programme: by the slopes of the errors it makes the largest of them least, within a box around the
 points, and with no line shorter than it may be.  The length of a line is convex in its ends: one that is long enough by
 its slope is so in truth (sequential linear programming: Fletcher and Sainz de la Maza 1989).
+
+A curve turns at some places, and each has its own largest error: the sum of them is made least where points are looked
+for from the start on.  If only the largest of all were, a place with a smaller error would come no nearer, and would
+hold the others up by where its points are.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from postproc.base.arrays import Floats
+from postproc.base.arrays import Floats, Ints
 from postproc.base.units import MM
 from postproc.compensation.point_fit import (
     LONGEST,
@@ -22,16 +26,16 @@ from postproc.compensation.point_fit import (
     moved_apart,
 )
 
-STEPS = 40
+STEPS = 60
 """Linear programmes of a search."""
 
 FIRST, SHORTEST = 0.3 * MM, 1e-6
 """[m] The box around the points: at first, and where the search ends."""
 
-WIDER, NARROWER = 2.0, 0.35
+WIDER, NARROWER = 2.0, 0.5
 """The box after a step that came nearer, and after one that did not."""
 
-SOME, GAIN = 6, 0.995
+SOME, GAIN = 6, 0.998
 """So many steps in which no more than this share remains of the error, or the search ends."""
 
 LITTLE = 0.2
@@ -45,39 +49,67 @@ MICRO = 1e6
 
 
 def closest_points(
-    curve: Curves, parameter: Floats, reach: Floats, shortest: Floats, enough: float, vertex: int
+    curve: Curves,
+    parameter: Floats,
+    reach: Floats,
+    shortest: Floats,
+    enough: float,
+    vertex: int,
+    aside: Floats | None = None,
 ) -> tuple[Floats, float]:
     """As ``fit_points``, of one curve: points (1, K, 3) [m] from where they have the ``parameter`` (1, K) [m] on, and
     their largest distance [m] from it, inf where they have no room; ``reach`` (1, K) and ``shortest`` (1, K - 1) [m] as
-    there."""
-    points = moved_apart(curve.at(parameter)[0], shortest)
+    there.  aside (1, K, 3) [m]: from there the points start, and each turn of the curve has an error of its own; None:
+    from the curve, and the largest error of all is made least."""
+    each_turn = aside is not None
+    floor = enough if each_turn else 0.0
+    start = curve.at(parameter)[0]
+    points = moved_apart(start if aside is None else start + aside, shortest)
     best = evaluate_polygons(curve, points, reach, None, parameter, vertex)
     if not long_enough(points, shortest)[0]:
         return points, np.inf
-    box, past = FIRST, [float(best.largest[0])]
+    past, box = [_sum_of_largest(best, _turn_nearest(curve, best, each_turn), floor)], FIRST
     for _ in range(STEPS):
-        if past[-1] <= enough or box < SHORTEST or (len(past) > SOME and past[-1] > GAIN * past[-1 - SOME]):
+        done = best.largest[0] <= enough or (len(past) > SOME and past[-1] > GAIN * past[-1 - SOME])
+        if done or box < SHORTEST:
             break
-        step = _step(curve, best, shortest[0], box)
+        step = _step(curve, best, shortest[0], box, floor, _turn_nearest(curve, best, each_turn))
         moved = best.points.copy()
         moved[0, 1:-1] += step
         found = evaluate_polygons(curve, moved, reach, best.parameter, best.label, vertex)
-        if long_enough(moved, shortest)[0] and found.largest[0] < past[-1]:
+        size = _sum_of_largest(found, _turn_nearest(curve, found, each_turn), floor)
+        if long_enough(moved, shortest)[0] and size < past[-1]:
             best, box = found, min(WIDER * box, LONGEST)
-            past.append(float(found.largest[0]))
+            past.append(size)
         else:
             box *= NARROWER
-    return best.points, past[-1]
+    return best.points, float(best.largest[0])
 
 
-def _step(curve: Curves, polygon: Polygons, shortest: Floats, box: float) -> Floats:
-    """(K - 2, 3) [m] by how much the inner points move, ``box`` [m] at most in each coordinate."""
+def _turn_nearest(curve: Curves, polygon: Polygons, each_turn: bool) -> Ints:
+    """(S,) the number of the turn of the curve that is nearest to each place of the polygon; 0 if not each counts."""
+    turn = curve.turn[0] if each_turn else curve.turn[0, :1]
+    return np.asarray(np.searchsorted(0.5 * (turn[1:] + turn[:-1]), polygon.parameter[0]))
+
+
+def _sum_of_largest(polygon: Polygons, turn: Ints, enough: float) -> float:
+    """[m] The largest errors of places beside each ``turn`` (S,), ``enough`` [m] at least, together."""
+    largest = np.full(int(turn.max()) + 1, enough)
+    np.maximum.at(largest, turn, np.linalg.norm(polygon.off[0], axis=1))
+    return float(largest.sum())
+
+
+def _step(
+    curve: Curves, polygon: Polygons, shortest: Floats, box: float, enough: float, turn: Ints
+) -> Floats:
+    """(K - 2, 3) [m] by how much the inner points move, ``box`` [m] at most in each coordinate;
+    ``turn`` (S,): beside which turn the places are."""
     from scipy.optimize import linprog  # where it is needed alone
 
-    off, slope = polygon.off[0], polygon.slope[0]
+    off, slope, turns = polygon.off[0], polygon.slope[0], int(turn.max()) + 1
     size = np.linalg.norm(off, axis=1)
     some = size > LITTLE * size.max()
-    off, slope, size = off[some], slope[some], size[some]
+    off, slope, size, turn = off[some], slope[some], size[some], turn[some]
     tangent = curve.at(polygon.parameter)[1][0][some]
     one = off / np.maximum(size, 1e-15)[:, None]
     two = np.cross(tangent, one)
@@ -96,11 +128,11 @@ def _step(curve: Curves, polygon: Polygons, shortest: Floats, box: float) -> Flo
     shorter[numbers, numbers], shorter[numbers, numbers + 1] = line, -line
     lines = shorter[:, 1:-1].reshape(count, width)
 
-    rows = np.block([[errors, -np.ones((len(errors), 1))], [lines, np.zeros((count, 1))]])
+    largest = np.tile(turn, len(ways))[:, None] == np.arange(turns)
+    rows = np.block([[errors, -largest.astype(float)], [lines, np.zeros((count, turns))]])
     most = MICRO * np.concatenate([-now, np.minimum(length - shortest, 1.0)])
-    sides = [(-MICRO * box, MICRO * box)] * width
-    solved = linprog(
-        np.append(np.zeros(width), 1.0), rows, most, bounds=[*sides, (0.0, None)], method="highs"
-    )
+    sides = [*[(-MICRO * box, MICRO * box)] * width, *[(MICRO * enough, None)] * turns]
+    cost = np.append(np.zeros(width), np.ones(turns))
+    solved = linprog(cost, rows, most, bounds=sides, method="highs")
     step = np.zeros(width) if solved.x is None else solved.x[:width] / MICRO
     return np.asarray(step.reshape(-1, 3))

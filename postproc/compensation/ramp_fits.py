@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,14 +86,18 @@ STARTS: tuple[tuple[Words, ...], ...] = (
 """Where 1, 2, ... inserted points and that of an approximated vertex may start: beside the vertex, in parts of
 ``BESIDE`` of its approximation, or beside the end of the ramp, in parts of the shortest motion."""
 
-CLOSE_STARTS: tuple[tuple[Words, float], ...] = (
-    (_both(range(-1, 2), range(-1, 2)), 1.02),
-    (_both(range(-1, 3), range(-1, 2)), 1.02),
-    (_both(range(-1, 3), range(-2, 2)), 1.02),
-    (_both(range(-2, 3), range(-2, 3)), 1.02),
+CLOSE_STARTS: tuple[tuple[Words, float, bool], ...] = (
+    (_both(range(-1, 2), range(-1, 2)), 1.02, False),
+    (_both(range(-1, 3), range(-1, 2)), 1.02, False),
+    (_both(range(-3, 4), range(-3, 4)), 1.0, False),
+    (_both(range(-3, 4), range(-3, 4)), 1.0, True),
 )
-"""Where points start that are fitted closely, as near to each other as the shortest motion lets them, and by which
-factor lines are longer than that."""
+"""Where points start that are fitted closely, as near to each other as the shortest motion lets them; by which factor
+lines are longer than that; and whether the points beside the end of the ramp start on both sides of the curve."""
+
+SIDES = np.array([-0.10, 0.07, -0.06, 0.06])
+"""Where a curve turns by k, its point and those beside it are off the curve by k times the shortest motion times this:
+of the points nearest to a bent line, of which none are closer to each other."""
 
 ON = 1e-5
 """[m] The next point is farther on by so much at least."""
@@ -189,15 +194,24 @@ class CloseFits:
 
     def __init__(self) -> None:
         self._known: dict[tuple[str, int, bytes], FittedPoints | None] = {}
+        self._curves: dict[bytes, Curves] = {}
+
+    def curve(self, place: Floats, build: Callable[[], Curves]) -> Curves:
+        """The close curve of a ramp whose curve has the places (N + 2, 3) [m]."""
+        key = place.tobytes()
+        if key not in self._curves:
+            self._curves[key] = build()
+        return self._curves[key]
 
     def fit(self, ramp: FittedRamps, curve: Curves, number: int, allowed: float) -> FittedPoints | None:
         """The points of one ramp, approximated at its vertex, from the start ``number`` on, until they are within
         ``allowed`` [m]; None where they have no room."""
         key = "start", number, curve.place.tobytes()
         if key not in self._known:
-            words, spare = CLOSE_STARTS[number]
+            words, spare, both_sides = CLOSE_STARTS[number]
             start, own = _apart(ramp, curve, words, None, spare), words.index((_V, 0.0))
-            self._known[key] = _closely_fitted(ramp, curve, start, own, allowed)
+            aside = _on_both_sides(ramp, curve, words, both_sides)
+            self._known[key] = _closely_fitted(ramp, curve, start, own, allowed, aside)
         return self._known[key]
 
     def go_on(self, ramp: FittedRamps, curve: Curves, points: FittedPoints, allowed: float) -> FittedPoints:
@@ -209,14 +223,32 @@ class CloseFits:
         return points if found is None or found.largest >= points.largest else found
 
 
+def _on_both_sides(ramp: FittedRamps, curve: Curves, words: Words, both: bool) -> Floats:
+    """(1, n + 2, 3) [m] by how much the points ``words`` of one ramp, and those before and after them, are off the
+    curve where they start: on its ``both`` sides beside the end of the ramp, or not at all."""
+    found = np.zeros((1, len(words) + 2, 3))
+    if both:
+        step = ramp.spacing[0, 1]
+        place, tangent, _ = (v[0] for v in curve.at(ramp.end[0] + step * np.array([[-1.0, 0.0, 1.0]])))
+        turn = place[0] + place[2] - 2.0 * place[1]
+        turn -= (turn @ tangent[1]) * tangent[1]
+        for number, (at, k) in enumerate(words, 1):
+            if at == _E:
+                found[0, number] = SIDES[abs(int(k))] * turn
+    return found
+
+
 def _closely_fitted(
-    ramp: FittedRamps, curve: Curves, start: Floats, own: int, allowed: float
+    ramp: FittedRamps, curve: Curves, start: Floats, own: int, allowed: float, aside: Floats | None = None
 ) -> FittedPoints | None:
-    """From ``start`` (1, n) [m] on, of which ``own`` is the motion that is there already."""
+    """From ``start`` (1, n) [m] on, of which ``own`` is the motion that is there already; ``aside`` (1, n + 2, 3) [m]
+    as of ``closest_points``."""
     parameter, reach, shortest, vertex = _polygons(ramp, curve, start, own, exact=False)
     if (np.diff(parameter) <= 0.0).any():
         return None
-    points, largest = closest_points(curve, parameter, reach, shortest, CLOSE_ENOUGH * allowed, vertex)
+    points, largest = closest_points(
+        curve, parameter, reach, shortest, CLOSE_ENOUGH * allowed, vertex, aside
+    )
     if not np.isfinite(largest):
         return None
     return FittedPoints(points[0, 1:-1], curve.nearest(points, parameter)[0, 1:-1], own, largest)
