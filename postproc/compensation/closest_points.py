@@ -26,19 +26,22 @@ from postproc.compensation.point_fit import (
     moved_apart,
 )
 
-STEPS = 60
+STEPS = 120
 """Linear programmes of a search."""
 
-FIRST, SHORTEST = 0.3 * MM, 1e-6
+FIRST, SHORTEST = 0.1 * MM, 1e-6
 """[m] The box around the points: at first, and where the search ends."""
 
-WIDER, NARROWER = 2.0, 0.5
+WIDER, NARROWER = 2.0, 0.4
 """The box after a step that came nearer, and after one that did not."""
 
-SOME, GAIN = 6, 0.998
+SOME, GAIN = 6, 0.9999
 """So many steps in which no more than this share remains of the error, or the search ends."""
 
-LITTLE = 0.2
+FAR = 1.0 * MM
+"""Errors beside other turns than the one that counts."""
+
+LITTLE = 0.1
 """Errors below this share of the largest are left out of a step."""
 
 ANGLES = np.arange(8) * np.pi / 4
@@ -55,58 +58,93 @@ def closest_points(
     shortest: Floats,
     enough: float,
     vertex: int,
-    aside: Floats | None = None,
+    start: Floats | None = None,
 ) -> tuple[Floats, float]:
     """As ``fit_points``, of one curve: points (1, K, 3) [m] from where they have the ``parameter`` (1, K) [m] on, and
     their largest distance [m] from it, inf where they have no room; ``reach`` (1, K) and ``shortest`` (1, K - 1) [m] as
-    there.  aside (1, K, 3) [m]: from there the points start, and each turn of the curve has an error of its own; None:
-    from the curve, and the largest error of all is made least."""
-    each_turn = aside is not None
-    floor = enough if each_turn else 0.0
-    start = curve.at(parameter)[0]
-    points = moved_apart(start if aside is None else start + aside, shortest)
-    best = evaluate_polygons(curve, points, reach, None, parameter, vertex)
-    if not long_enough(points, shortest)[0]:
-        return points, np.inf
-    past, box = [_sum_of_largest(best, _turn_nearest(curve, best, each_turn), floor)], FIRST
+    there.  start (1, K, 3) [m]: there the points start, and each turn of the curve has an error of its own; None:
+    on the curve, and the largest error of all is made least."""
+    floor = np.zeros(1) if start is None else np.full(curve.turn.shape[1], enough)
+    points = curve.at(parameter)[0] if start is None else start
+    best = _search(curve, points, parameter, reach, shortest, vertex, floor, enough)
+    return best.points, float(best.largest[0]) if long_enough(best.points, shortest)[0] else np.inf
+
+
+def closest_to_turn(
+    curve: Curves,
+    start: Floats,
+    parameter: Floats,
+    reach: Floats,
+    shortest: Floats,
+    enough: float,
+    vertex: int,
+    turn: int,
+) -> tuple[Floats, float]:
+    """As ``closest_points`` with a ``start``, beside the ``turn`` of the curve alone, and the largest distance there:
+    beside the others it may be ``FAR``."""
+    floor = np.full(curve.turn.shape[1], FAR)
+    floor[turn] = enough
+    best = _search(curve, start, parameter, reach, shortest, vertex, floor, enough + FAR * (len(floor) - 1))
+    if not long_enough(best.points, shortest)[0]:
+        return best.points, np.inf
+    here = _turn_nearest(curve, best, len(floor)) == turn
+    return best.points, float(np.linalg.norm(best.off[0][here], axis=1).max(initial=0.0))
+
+
+def _search(
+    curve: Curves,
+    start: Floats,
+    parameter: Floats,
+    reach: Floats,
+    shortest: Floats,
+    vertex: int,
+    floor: Floats,
+    enough: float,
+) -> Polygons:
+    """The polygon whose largest errors beside each turn, or (of one ``floor``) anywhere, together are least; each is
+    ``floor`` (T,) [m] at least, and ``enough`` [m] together ends the search."""
+    turns = len(floor)
+    best = evaluate_polygons(curve, moved_apart(start, shortest), reach, None, parameter, vertex, True)
+    if not long_enough(best.points, shortest)[0]:
+        return best
+    past, box = [_sum_of_largest(best, _turn_nearest(curve, best, turns), floor)], FIRST
     for _ in range(STEPS):
-        done = best.largest[0] <= enough or (len(past) > SOME and past[-1] > GAIN * past[-1 - SOME])
+        done = past[-1] <= enough or (len(past) > SOME and past[-1] > GAIN * past[-1 - SOME])
         if done or box < SHORTEST:
             break
-        step = _step(curve, best, shortest[0], box, floor, _turn_nearest(curve, best, each_turn))
         moved = best.points.copy()
-        moved[0, 1:-1] += step
-        found = evaluate_polygons(curve, moved, reach, best.parameter, best.label, vertex)
-        size = _sum_of_largest(found, _turn_nearest(curve, found, each_turn), floor)
+        moved[0, 1:-1] += _step(best, curve, shortest[0], box, floor, _turn_nearest(curve, best, turns))
+        found = evaluate_polygons(curve, moved, reach, best.parameter, best.label, vertex, True)
+        size = _sum_of_largest(found, _turn_nearest(curve, found, turns), floor)
         if long_enough(moved, shortest)[0] and size < past[-1]:
             best, box = found, min(WIDER * box, LONGEST)
             past.append(size)
         else:
             box *= NARROWER
-    return best.points, float(best.largest[0])
+    return best
 
 
-def _turn_nearest(curve: Curves, polygon: Polygons, each_turn: bool) -> Ints:
-    """(S,) the number of the turn of the curve that is nearest to each place of the polygon; 0 if not each counts."""
-    turn = curve.turn[0] if each_turn else curve.turn[0, :1]
+def _turn_nearest(curve: Curves, polygon: Polygons, turns: int) -> Ints:
+    """(S,) the number of the turn of the curve that is nearest to each place of the polygon; 0 where one counts."""
+    turn = curve.turn[0, :turns]
     return np.asarray(np.searchsorted(0.5 * (turn[1:] + turn[:-1]), polygon.parameter[0]))
 
 
-def _sum_of_largest(polygon: Polygons, turn: Ints, enough: float) -> float:
-    """[m] The largest errors of places beside each ``turn`` (S,), ``enough`` [m] at least, together."""
-    largest = np.full(int(turn.max()) + 1, enough)
+def _sum_of_largest(polygon: Polygons, turn: Ints, floor: Floats) -> float:
+    """[m] The largest errors of places beside each ``turn`` (S,), ``floor`` (T,) [m] at least, together."""
+    largest = floor.copy()
     np.maximum.at(largest, turn, np.linalg.norm(polygon.off[0], axis=1))
     return float(largest.sum())
 
 
 def _step(
-    curve: Curves, polygon: Polygons, shortest: Floats, box: float, enough: float, turn: Ints
+    polygon: Polygons, curve: Curves, shortest: Floats, box: float, floor: Floats, turn: Ints
 ) -> Floats:
     """(K - 2, 3) [m] by how much the inner points move, ``box`` [m] at most in each coordinate;
     ``turn`` (S,): beside which turn the places are."""
     from scipy.optimize import linprog  # where it is needed alone
 
-    off, slope, turns = polygon.off[0], polygon.slope[0], int(turn.max()) + 1
+    off, slope, turns = polygon.off[0], polygon.slope[0], len(floor)
     size = np.linalg.norm(off, axis=1)
     some = size > LITTLE * size.max()
     off, slope, size, turn = off[some], slope[some], size[some], turn[some]
@@ -131,7 +169,7 @@ def _step(
     largest = np.tile(turn, len(ways))[:, None] == np.arange(turns)
     rows = np.block([[errors, -largest.astype(float)], [lines, np.zeros((count, turns))]])
     most = MICRO * np.concatenate([-now, np.minimum(length - shortest, 1.0)])
-    sides = [*[(-MICRO * box, MICRO * box)] * width, *[(MICRO * enough, None)] * turns]
+    sides = [*[(-MICRO * box, MICRO * box)] * width, *[(MICRO * least, None) for least in floor]]
     cost = np.append(np.zeros(width), np.ones(turns))
     solved = linprog(cost, rows, most, bounds=sides, method="highs")
     step = np.zeros(width) if solved.x is None else solved.x[:width] / MICRO

@@ -116,7 +116,7 @@ def choose_ramp_points(
         curve = close.curve(
             curves.place[name], lambda this=this: _curves(task, division, ramps[this], CLOSE_PLACES)
         )
-        for number, (words, *_) in enumerate(CLOSE_STARTS):
+        for number, (words, _) in enumerate(CLOSE_STARTS):
             if not fewest[name] <= len(words) - 1 <= inner[name] + spare:
                 continue
             near = close.fit(ramps[this], curve, number, allowed)
