@@ -29,7 +29,7 @@ from postproc.compensation.point_fit import (
 STEPS = 120
 """Linear programmes of a search."""
 
-FIRST, SHORTEST = 0.1 * MM, 1e-6
+FIRST, SHORTEST = 0.05 * MM, 1e-6
 """[m] The box around the points: at first, and where the search ends."""
 
 WIDER, NARROWER = 2.0, 0.4
@@ -59,14 +59,15 @@ def closest_points(
     enough: float,
     vertex: int,
     start: Floats | None = None,
+    each_turn: bool = False,
 ) -> tuple[Floats, float]:
     """As ``fit_points``, of one curve: points (1, K, 3) [m] from where they have the ``parameter`` (1, K) [m] on, and
     their largest distance [m] from it, inf where they have no room; ``reach`` (1, K) and ``shortest`` (1, K - 1) [m] as
-    there.  start (1, K, 3) [m]: there the points start, and each turn of the curve has an error of its own; None:
-    on the curve, and the largest error of all is made least."""
-    floor = np.zeros(1) if start is None else np.full(curve.turn.shape[1], enough)
+    there.  start (1, K, 3) [m]: there the points start; None: on the curve.  each_turn: of the curve has an error of
+    its own, or the largest of all is made least."""
+    floor = np.full(curve.turn.shape[1], enough) if each_turn else np.zeros(1)
     points = curve.at(parameter)[0] if start is None else start
-    best = _search(curve, points, parameter, reach, shortest, vertex, floor, enough)
+    best = _search(curve, points, parameter, reach, shortest, vertex, floor, enough * len(floor))
     return best.points, float(best.largest[0]) if long_enough(best.points, shortest)[0] else np.inf
 
 

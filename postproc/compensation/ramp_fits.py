@@ -220,12 +220,18 @@ class CloseFits:
         return self._known[key]
 
     def go_on(self, ramp: FittedRamps, curve: Curves, points: FittedPoints, allowed: float) -> FittedPoints:
-        """The points of one ramp, approximated at its vertex, from ``points`` on, or these where none come nearer."""
+        """The points of one ramp, approximated at its vertex, from ``points`` on or from their places on the curve, or
+        these where none come nearer."""
         key = "points", len(points.along), curve.place.tobytes()
         if key not in self._known:
-            self._known[key] = _closely_fitted(ramp, curve, points.along[None], points.own, allowed)
-        found = self._known[key]
-        return points if found is None or found.largest >= points.largest else found
+            found = [
+                _closely_fitted(ramp, curve, points.along[None], points.own, allowed, place)
+                for place in (None, points.place[None])
+            ]
+            nearest = [one for one in found if one is not None]
+            self._known[key] = min(nearest, key=lambda one: one.largest, default=None)
+        best = self._known[key]
+        return points if best is None or best.largest >= points.largest else best
 
 
 def _fitted_by_turns(ramp: FittedRamps, curve: Curves, words: Words, allowed: float) -> FittedPoints | None:
@@ -252,7 +258,7 @@ def _fitted_by_turns(ramp: FittedRamps, curve: Curves, words: Words, allowed: fl
         if not np.isfinite(nearest):
             return None
     start = curve.nearest(place, _apart(ramp, curve, words, None, 1.0))
-    return _closely_fitted(ramp, curve, start, words.index((_V, 0.0)), allowed, place)
+    return _closely_fitted(ramp, curve, start, words.index((_V, 0.0)), allowed, place, each_turn=True)
 
 
 def _on_both_sides(ramp: FittedRamps, curve: Curves, words: Words, at: str) -> Floats:
@@ -267,10 +273,16 @@ def _on_both_sides(ramp: FittedRamps, curve: Curves, words: Words, at: str) -> F
 
 
 def _closely_fitted(
-    ramp: FittedRamps, curve: Curves, start: Floats, own: int, allowed: float, place: Floats | None = None
+    ramp: FittedRamps,
+    curve: Curves,
+    start: Floats,
+    own: int,
+    allowed: float,
+    place: Floats | None = None,
+    each_turn: bool = False,
 ) -> FittedPoints | None:
     """From ``start`` (1, n) [m] on, of which ``own`` is the motion that is there already; ``place`` (1, n, 3) [m]: from
-    there on, off the curve."""
+    there on, off the curve; ``each_turn`` as of ``closest_points``."""
     parameter, reach, shortest, vertex = _polygons(ramp, curve, start, own, exact=False)
     if (np.diff(parameter) <= 0.0).any():
         return None
@@ -278,7 +290,9 @@ def _closely_fitted(
     if place is not None:
         first = curve.at(parameter)[0]
         first[:, 1:-1] = place
-    points, largest = closest_points(curve, parameter, reach, shortest, CLOSE_ENOUGH * allowed, vertex, first)
+    points, largest = closest_points(
+        curve, parameter, reach, shortest, CLOSE_ENOUGH * allowed, vertex, first, each_turn
+    )
     if not np.isfinite(largest):
         return None
     return FittedPoints(points[0, 1:-1], curve.nearest(points, parameter)[0, 1:-1], own, largest)

@@ -96,6 +96,12 @@ def choose_ramp_points(
     found: dict[int, FittedPoints] = {}
     nearest: dict[int, FittedPoints] = {}
     left, tried = np.arange(len(ramps.row)), set[int]()
+
+    def close_curve(name: int) -> Curves:
+        return close.curve(
+            curves.place[name], lambda: _curves(task, division, ramps[np.array([name])], CLOSE_PLACES)
+        )
+
     for count in range(1, len(STARTS) + 1):
         some = left[(fewest[left] <= count) & (count <= inner[left] + spare)]
         for name, one in fit_ramps(ramps[some], curves[some], count, allowed, some).items():
@@ -105,17 +111,14 @@ def choose_ramp_points(
                 and len(tried | {name}) <= SEARCHED
             ):
                 this, tried = np.array([name]), tried | {name}
-                one = close.go_on(ramps[this], curves[this], one, allowed)
+                one = close.go_on(ramps[this], close_curve(name), one, allowed)
             if one.largest <= allowed:
                 found[name] = one
             elif name not in nearest or one.largest < PAYS * nearest[name].largest:
                 nearest[name] = one
         left = np.array([k for k in left if k not in found], np.int64)
     for name in left[~ramps.exact[left]][:SEARCHED].tolist():
-        this = np.array([name])
-        curve = close.curve(
-            curves.place[name], lambda this=this: _curves(task, division, ramps[this], CLOSE_PLACES)
-        )
+        this, curve = np.array([name]), close_curve(name)
         for number, (words, _) in enumerate(CLOSE_STARTS):
             if not fewest[name] <= len(words) - 1 <= inner[name] + spare:
                 continue
