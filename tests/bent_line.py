@@ -1,4 +1,4 @@
-"""``python -m tests.bent_line [SLOPE ...]``: how near points that keep their distance come to a line that bends.
+"""``python -m tests.bent_line [SLOPE ...]``: how near points that keep their distance come to a line that turns at once.
 
 In a plane, apart from all code of the package: the line y = max(slope x, 0), points at least 0.6 mm apart (50 mm/s and
 a cycle of 12 ms), rounded off by parabolas from 0.5 mm on or from half of the shorter line beside them.  The largest
@@ -50,7 +50,7 @@ def driven(points: np.ndarray) -> np.ndarray:
 
 
 def errors(points: np.ndarray, slope: float) -> np.ndarray:
-    """(B, S + 1) [mm] of the polygons (B, n, 2); the last one where the line bends."""
+    """(B, S + 1) [mm] of the polygons (B, n, 2); the last one where the line turns."""
     place = driven(points)
     off = place[..., 1] - slope * np.maximum(place[..., 0], 0.0)
     all_ = np.arange(len(place))
