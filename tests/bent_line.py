@@ -1,4 +1,4 @@
-"""``python -m tests.bent_line [SLOPE ...]``: how near points that keep their distance come to a line that turns at once.
+"""``python -m tests.bent_line [SLOPE ...]``: how near points that keep their distance come to a line with a turn.
 
 In a plane, apart from all code of the package: the line y = max(slope x, 0), points at least 0.6 mm apart (50 mm/s and
 a cycle of 12 ms), rounded off by parabolas from 0.5 mm on or from half of the shorter line beside them.  The largest
