@@ -34,6 +34,9 @@ def test_the_taught_sample_needs_more_points_than_a_tenth_of_its_motions(task):
     found = least_points(task)
     assert len(found) == 10
     assert all(none > 3 * task.tolerance for _, none, _ in found.values())
-    assert sum(count for count, _, _ in found.values()) >= 14
-    # of which 1.1 times the motions would leave two
-    assert 1.1 * len(task.toolpath) < len(task.toolpath) + 3
+    least = sum(count for count, _, _ in found.values())
+    motions = len(task.toolpath)
+    assert least == 16
+    assert (motions + least) / motions == pytest.approx(1.615, abs=1e-3)
+    # 1.1 times the motions would leave two of them
+    assert 1.1 * motions < motions + 3

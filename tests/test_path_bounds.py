@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bent_line import DISTANCE, distances, errors, search
 from judge.cases import CASES, DEG, Case, run
 from judge.cell import Cell
 from judge.force import Field
@@ -92,6 +93,28 @@ def test_arcs_that_correct_the_position_turn_the_tool_where_it_turns_with_them(t
     axis, about = np.linalg.norm(turn[:2]), abs(turn[2])
     assert (axis * DEG, about * DEG) == pytest.approx((0.19, 1.54), rel=0.05)
     assert axis > TOLERANCE_ANGLE
+
+
+# Points that keep their distance
+
+
+def test_a_single_point_is_off_by_what_its_parabola_takes() -> None:
+    """k d / 4 over a turn by k, which is one of reach d square to x."""
+    points = np.array([[[-5.0, 0.0], [0.0, 0.0], [5.0, 4.0]]])
+    d = 0.5 * (1.0 + 1.0 / np.hypot(1.0, 0.8)) / 2
+    assert np.abs(errors(points, 0.8)).max() == pytest.approx(0.8 * d / 4, rel=0.02)
+
+
+@pytest.mark.parametrize(("slope", "least"), [(0.885, 0.0182), (1.09, 0.0209)])
+def test_what_points_that_keep_their_distance_leave_of_a_turn(slope: float, least: float) -> None:
+    """A search in the plane, apart from the package's: where the force turns round (1.09) none of its starts ends
+    within the tolerance, at the end of the lead-ins' ramps (0.885) most do.  A search is no proof; but no start came
+    below."""
+    found = search(slope)
+    assert found[0].largest == pytest.approx(least, abs=1e-4)
+    assert all(distances(one.points).min() > DISTANCE - 1e-6 for one in found)
+    within = sum(one.largest <= TOLERANCE / MM for one in found)
+    assert within == 0 if slope > 1.0 else within > len(found) / 2
 
 
 # Splines

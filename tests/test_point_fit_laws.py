@@ -407,3 +407,27 @@ def test_a_close_fit_is_much_nearer_than_its_start() -> None:
     drawn = rounded(points[0], words[0][0])
     true = np.abs(drawn[:, 1] - slope * np.clip(drawn[:, 0], 0.0, 8.0 * MM)).max()
     assert largest == pytest.approx(true, rel=0.03)
+
+
+@pytest.mark.parametrize("slope", [0.9, -0.4])
+def test_where_a_curve_turns_the_place_of_a_polygon_moves_along_the_polygon(slope: float) -> None:
+    """The error there is that of the drawn path where x is that of the turn, however the points move."""
+    chosen, parameter = bent(slope), np.array([[-30.0, *START, 38.0]]) * MM
+    reach, numbers = np.full((1, 7), 0.5 * MM), np.random.default_rng(3)
+    points = moved_apart(chosen.at(parameter)[0], np.full((1, 6), 0.6 * MM))
+    points[0, 1:-1, :2] += numbers.uniform(-0.05, 0.05, (5, 2)) * MM
+    turns, tiny = chosen.turn[0], 1e-4 * MM
+
+    def at_turns(some: np.ndarray) -> np.ndarray:
+        drawn = rounded(some[0], reach[0])
+        return np.interp(turns, drawn[:, 0], drawn[:, 1]) - slope * np.clip(turns, 0.0, 8.0 * MM)
+
+    polygon = evaluate_polygons(chosen, points, reach, None, parameter, 2, True)
+    np.testing.assert_allclose(polygon.off[0, -2:, 1], at_turns(points), atol=1e-6)
+    by_points = polygon.slope[0, -2:, 1].reshape(2, 5, 3)
+    for point in range(5):
+        for axis in (0, 1):
+            moved = points.copy()
+            moved[0, 1 + point, axis] += tiny
+            change = (at_turns(moved) - at_turns(points)) / tiny
+            np.testing.assert_allclose(by_points[:, point, axis], change, atol=0.03)

@@ -12,11 +12,12 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 from test_corner_fit import ALONG, FREE, square, two_sides
 
-from postproc.compensation.closest_points import closest_points
+from postproc.compensation.closest_points import closest_points, closest_to_turn
 from postproc.compensation.corner_fit import fit_corners
 from postproc.compensation.corners import rounded_errors
 from postproc.compensation.correct import correct
 from postproc.compensation.point_fit import Curves, evaluate_polygons, fit_points, moved_apart
+from postproc.compensation.ramp_fits import CLOSE_STARTS, CloseFits, FittedRamps
 from postproc.compensation.ramp_points import NEVER, choose_ramp_points
 from postproc.compensation.rounded_path import RoundedOutput
 from postproc.compensation.subdivide import subdivide
@@ -79,6 +80,43 @@ def test_points_that_keep_their_distance_are_as_near_as_they_can_be(slope: float
     nearest = {0.75: 0.0162, 1.135: 0.0214}[slope] * MM
     assert 0.98 * nearest < largest < 1.2 * nearest
     assert largest < 0.93 * by_fit
+
+
+def ramp_along(curve: Curves) -> FittedRamps:
+    """The ramp of ``bent``, with room on both sides."""
+    none, both = np.zeros(1, np.int64), np.ones((1, 2))
+    return FittedRamps(none, none, none, curve.turn[:, 1], np.zeros(1, bool), 0.5 * MM * both, 0.6 * MM * both,
+                       9.0 * MM * both, none, np.zeros((1, 2), bool))  # fmt: skip
+
+
+@pytest.mark.parametrize("slope", [0.885, 1.09])
+def test_points_beside_each_turn_come_as_near_as_a_search_in_the_plane(slope: float) -> None:
+    """``tests.bent_line``: 0.0182 and 0.0209 mm, each the least of many starts beside one turn."""
+    curve = bent(slope)
+    *others, found = (
+        CloseFits().fit(ramp_along(curve), curve, number, 0.0) for number in range(len(CLOSE_STARTS))
+    )
+    assert found is not None
+    nearest = {0.885: 0.0182, 1.09: 0.0209}[slope] * MM
+    assert 0.99 * nearest < found.largest < 1.04 * nearest
+    assert all(one is not None and one.largest > 1.05 * found.largest for one in others)
+    points = np.concatenate([curve.place[0, :1], found.place, curve.place[0, -1:]])
+    assert np.linalg.norm(np.diff(points, axis=0), axis=1).min() > 0.5999 * MM
+    assert drawn_error(points, slope, 0.5 * MM) == pytest.approx(found.largest, rel=0.03)
+
+
+@pytest.mark.parametrize("turn", [0, 1])
+def test_one_turn_alone_leaves_the_other_as_far_as_it_may_be(turn: int) -> None:
+    curve = bent(0.885)
+    beside = turn * END + np.array([-1.2, -0.6, 0.0, 0.6, 1.2]) * MM
+    inner = np.sort(np.append(beside, (1 - turn) * END))
+    parameter = np.concatenate([[-30.0 * MM], inner, [40.0 * MM]])[None]
+    words = np.full(parameter.shape, 0.5 * MM), np.full((1, parameter.shape[1] - 1), 0.6 * MM)
+    vertex = 1 + int(np.argmin(np.abs(inner)))
+    start = curve.at(parameter)[0]
+    points, largest = closest_to_turn(curve, start, parameter, *words, 0.0, vertex, turn)
+    assert largest < 0.022 * MM
+    assert drawn_error(points[0], 0.885, 0.5 * MM) > 1.5 * largest
 
 
 def fitted(slope: float, reach: float, *start: float) -> tuple[np.ndarray, float]:

@@ -226,10 +226,17 @@ def least_largest(off: Floats, slope: Floats, damping: Floats) -> Floats:
 
 
 def evaluate_polygons(
-    curves: Curves, points: Floats, reach: Floats, near: Floats | None, label: Floats, vertex: int
+    curves: Curves,
+    points: Floats,
+    reach: Floats,
+    near: Floats | None,
+    label: Floats,
+    vertex: int,
+    stays: bool = False,
 ) -> Polygons:
     """The polygons (G, K, 3) against their curves; the nearest places are looked for from ``near`` (G, S), or from
-    where the points have the parameters ``label`` (G, K); ``reach`` (G, K) [m] as of ``fit_points``."""
+    where the points have the parameters ``label`` (G, K); ``reach`` (G, K) [m] as of ``fit_points``.  stays: where a
+    curve turns its place does, and that of the polygon moves along the polygon; else as everywhere."""
     label = _labels(curves, points, label, vertex)
     weights, slope, bend = _weights(curves, points, reach, label, vertex)
     place = weights @ points + bend
@@ -237,12 +244,18 @@ def evaluate_polygons(
     near = (weights @ label[..., None])[..., 0] if near is None else near[:, : place.shape[1]]
     at = curves.nearest(place, near, secants)
     more, factors = _turns(curves, at)
+    before, after = (
+        [np.take_along_axis(v, k, 1) for v in (*np.moveaxis(place, 2, 0), at)] for k in (more, more + 1)
+    )
+    *driven, passed = (b - a for a, b in zip(before, after, strict=True))
     weights, slope, bend = (_with_turns(values, more, factors) for values in (weights, slope, bend))
     place = weights @ points + bend
     at = curves.nearest(place, _with_turns(at, more, factors), 1)
     here, tangent, along = curves.at(at)
     off = place - here
     off -= np.sum(off * tangent, axis=2)[..., None] * tangent
+    if stays:
+        along[:, -more.shape[1] :] = np.stack(driven, axis=2) / np.maximum(passed, 1e-12)[..., None]
     # where a place moves, that of the curve follows: (place - here) stays square to the tangent
     ahead = along / np.maximum(np.sum(along * tangent, axis=2), FLATTEST)[..., None]
     slope = slope - ahead[..., None] * np.einsum("gsi,gsiv->gsv", tangent, slope)[:, :, None, :]

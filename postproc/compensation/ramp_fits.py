@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
-from postproc.compensation.closest_points import closest_points
+from postproc.compensation.closest_points import closest_points, closest_to_turn
 from postproc.compensation.point_fit import Curves, fit_points
 
 ENOUGH = 0.85
@@ -88,11 +89,18 @@ STARTS: tuple[tuple[Words, ...], ...] = (
 CLOSE_STARTS: tuple[tuple[Words, float], ...] = (
     (_both(range(-1, 2), range(-1, 2)), 1.02),
     (_both(range(-1, 3), range(-1, 2)), 1.02),
-    (_both(range(-1, 3), range(-2, 2)), 1.02),
-    (_both(range(-2, 3), range(-2, 3)), 1.02),
+    (_both(range(-3, 4), range(-3, 4)), 1.0),
 )
 """Where points start that are fitted closely, as near to each other as the shortest motion lets them, and by which
-factor lines are longer than that."""
+factor lines are longer than that.  Of the last ones those beside each turn are fitted alone first."""
+
+ALONE = ((1.0, 0.0), (1.0, 1.0), (1.08, 0.5))
+"""Lines are longer by such factors where the points beside a turn start alone, and the points are off the curve by such
+parts of ``SIDES``."""
+
+SIDES = np.array([-0.10, 0.07, -0.06, 0.06])
+"""Where a curve turns by k, its point and those beside it are off the curve by k times the shortest motion times this:
+of the points nearest to a bent line, of which none are closer to each other."""
 
 ON = 1e-5
 """[m] The next point is farther on by so much at least."""
@@ -189,6 +197,14 @@ class CloseFits:
 
     def __init__(self) -> None:
         self._known: dict[tuple[str, int, bytes], FittedPoints | None] = {}
+        self._curves: dict[bytes, Curves] = {}
+
+    def curve(self, place: Floats, build: Callable[[], Curves]) -> Curves:
+        """The close curve of a ramp whose curve has the places (N + 2, 3) [m]."""
+        key = place.tobytes()
+        if key not in self._curves:
+            self._curves[key] = build()
+        return self._curves[key]
 
     def fit(self, ramp: FittedRamps, curve: Curves, number: int, allowed: float) -> FittedPoints | None:
         """The points of one ramp, approximated at its vertex, from the start ``number`` on, until they are within
@@ -196,27 +212,87 @@ class CloseFits:
         key = "start", number, curve.place.tobytes()
         if key not in self._known:
             words, spare = CLOSE_STARTS[number]
-            start, own = _apart(ramp, curve, words, None, spare), words.index((_V, 0.0))
-            self._known[key] = _closely_fitted(ramp, curve, start, own, allowed)
+            if number + 1 < len(CLOSE_STARTS):
+                start, own = _apart(ramp, curve, words, None, spare), words.index((_V, 0.0))
+                self._known[key] = _closely_fitted(ramp, curve, start, own, allowed)
+            else:
+                self._known[key] = _fitted_by_turns(ramp, curve, words, allowed)
         return self._known[key]
 
     def go_on(self, ramp: FittedRamps, curve: Curves, points: FittedPoints, allowed: float) -> FittedPoints:
-        """The points of one ramp, approximated at its vertex, from ``points`` on, or these where none come nearer."""
+        """The points of one ramp, approximated at its vertex, from ``points`` on or from their places on the curve, or
+        these where none come nearer."""
         key = "points", len(points.along), curve.place.tobytes()
         if key not in self._known:
-            self._known[key] = _closely_fitted(ramp, curve, points.along[None], points.own, allowed)
-        found = self._known[key]
-        return points if found is None or found.largest >= points.largest else found
+            found = [
+                _closely_fitted(ramp, curve, points.along[None], points.own, allowed, place)
+                for place in (None, points.place[None])
+            ]
+            nearest = [one for one in found if one is not None]
+            self._known[key] = min(nearest, key=lambda one: one.largest, default=None)
+        best = self._known[key]
+        return points if best is None or best.largest >= points.largest else best
+
+
+def _fitted_by_turns(ramp: FittedRamps, curve: Curves, words: Words, allowed: float) -> FittedPoints | None:
+    """The points ``words``, those beside each turn fitted alone first, from the best of some starts."""
+    place = np.empty((1, len(words), 3))
+    for turn, at in enumerate((_V, _E)):
+        alone = tuple(word for word in words if word[0] == at or not word[1])
+        own, nearest = alone.index((_V, 0.0)), np.inf
+        for spare, share in ALONE:
+            start = _apart(ramp, curve, alone, None, spare)
+            parameter, reach, shortest, vertex = _polygons(ramp, curve, start, own, exact=False)
+            if (np.diff(parameter) <= 0.0).any():
+                continue
+            points = curve.at(parameter)[0]
+            points[:, 1:-1] += share * _on_both_sides(ramp, curve, alone, at)
+            enough = CLOSE_ENOUGH * allowed
+            points, largest = closest_to_turn(curve, points, parameter, reach, shortest, enough, vertex, turn)
+            if largest < nearest:
+                nearest = largest
+                mine = [k for k, word in enumerate(alone, 1) if word[0] == at]
+                place[:, [k for k, word in enumerate(words) if word[0] == at]] = points[:, mine]
+            if largest <= enough:
+                break
+        if not np.isfinite(nearest):
+            return None
+    start = curve.nearest(place, _apart(ramp, curve, words, None, 1.0))
+    return _closely_fitted(ramp, curve, start, words.index((_V, 0.0)), allowed, place, each_turn=True)
+
+
+def _on_both_sides(ramp: FittedRamps, curve: Curves, words: Words, at: str) -> Floats:
+    """(1, n, 3) [m] by how much the points ``words`` of one ramp are off the curve beside the turn ``at``: in turn on
+    either side of it."""
+    step, centre = ramp.spacing[0].max(), ramp.end[0] if at == _E else 0.0
+    place, tangent, _ = (v[0] for v in curve.at(centre + step * np.array([[-1.0, 0.0, 1.0]])))
+    turn = place[0] + place[2] - 2.0 * place[1]
+    turn -= (turn @ tangent[1]) * tangent[1]
+    size = [SIDES[abs(int(k))] if word == at else 0.0 for word, k in words]
+    return np.asarray(np.array(size)[None, :, None] * turn)
 
 
 def _closely_fitted(
-    ramp: FittedRamps, curve: Curves, start: Floats, own: int, allowed: float
+    ramp: FittedRamps,
+    curve: Curves,
+    start: Floats,
+    own: int,
+    allowed: float,
+    place: Floats | None = None,
+    each_turn: bool = False,
 ) -> FittedPoints | None:
-    """From ``start`` (1, n) [m] on, of which ``own`` is the motion that is there already."""
+    """From ``start`` (1, n) [m] on, of which ``own`` is the motion that is there already; ``place`` (1, n, 3) [m]: from
+    there on, off the curve; ``each_turn`` as of ``closest_points``."""
     parameter, reach, shortest, vertex = _polygons(ramp, curve, start, own, exact=False)
     if (np.diff(parameter) <= 0.0).any():
         return None
-    points, largest = closest_points(curve, parameter, reach, shortest, CLOSE_ENOUGH * allowed, vertex)
+    first = None
+    if place is not None:
+        first = curve.at(parameter)[0]
+        first[:, 1:-1] = place
+    points, largest = closest_points(
+        curve, parameter, reach, shortest, CLOSE_ENOUGH * allowed, vertex, first, each_turn
+    )
     if not np.isfinite(largest):
         return None
     return FittedPoints(points[0, 1:-1], curve.nearest(points, parameter)[0, 1:-1], own, largest)

@@ -52,8 +52,8 @@ ON_ARC = 12.0 * MM
 NEAREST = 1e-9
 """[m] The next point of an arc is by so much at least beyond the curve."""
 
-PLACES = 440
-"""Places of a curve."""
+PLACES, CLOSE_PLACES = 440, 1760
+"""Places of a curve, between which it is straight; and of one to which points are fitted closely from the start on."""
 
 PAYS = 0.9
 """Share of the error that is left which a fit with more points has to come below."""
@@ -96,6 +96,12 @@ def choose_ramp_points(
     found: dict[int, FittedPoints] = {}
     nearest: dict[int, FittedPoints] = {}
     left, tried = np.arange(len(ramps.row)), set[int]()
+
+    def close_curve(name: int) -> Curves:
+        return close.curve(
+            curves.place[name], lambda: _curves(task, division, ramps[np.array([name])], CLOSE_PLACES)
+        )
+
     for count in range(1, len(STARTS) + 1):
         some = left[(fewest[left] <= count) & (count <= inner[left] + spare)]
         for name, one in fit_ramps(ramps[some], curves[some], count, allowed, some).items():
@@ -105,17 +111,18 @@ def choose_ramp_points(
                 and len(tried | {name}) <= SEARCHED
             ):
                 this, tried = np.array([name]), tried | {name}
-                one = close.go_on(ramps[this], curves[this], one, allowed)
+                one = close.go_on(ramps[this], close_curve(name), one, allowed)
             if one.largest <= allowed:
                 found[name] = one
             elif name not in nearest or one.largest < PAYS * nearest[name].largest:
                 nearest[name] = one
         left = np.array([k for k in left if k not in found], np.int64)
     for name in left[~ramps.exact[left]][:SEARCHED].tolist():
+        this, curve = np.array([name]), close_curve(name)
         for number, (words, _) in enumerate(CLOSE_STARTS):
             if not fewest[name] <= len(words) - 1 <= inner[name] + spare:
                 continue
-            near = close.fit(ramps[np.array([name])], curves[np.array([name])], number, allowed)
+            near = close.fit(ramps[this], curve, number, allowed)
             if near is None:
                 continue
             if near.largest <= allowed:
@@ -239,30 +246,32 @@ def _rounded_off(
     return np.asarray(0.25 * reach * lengths(shift[1] - shift[0]) / end > SHOWS * task.tolerance)
 
 
-def _curves(task: CompensationProblem, division: Subdivision, ramps: FittedRamps) -> Curves:
+def _curves(
+    task: CompensationProblem, division: Subdivision, ramps: FittedRamps, places: int = PLACES
+) -> Curves:
     """Commands by which the tool is on the rounded path of the program, from before the vertex (there, where it is
     exact) to after the ramp."""
     rounded = np.stack([~ramps.exact, np.ones(len(ramps.row), bool)], axis=1)
     sides = np.where(rounded, ramps.margin, 0.0)
-    on_ramp = np.ceil((PLACES - 1) * ramps.end / (ramps.end + sides.sum(axis=1)))
+    on_ramp = np.ceil((places - 1) * ramps.end / (ramps.end + sides.sum(axis=1)))
     step = ramps.end / on_ramp  # the curve turns where the ramp starts and ends: there are places
-    before = np.floor((PLACES - 1 - on_ramp) * sides[:, 0] / sides.sum(axis=1))
+    before = np.floor((places - 1 - on_ramp) * sides[:, 0] / sides.sum(axis=1))
     first = -step * before
-    along = (first[:, None] + step[:, None] * np.arange(PLACES)).ravel()
-    row = np.repeat(ramps.row, PLACES)
+    along = (first[:, None] + step[:, None] * np.arange(places)).ravel()
+    row = np.repeat(ramps.row, places)
     row = np.where(along < 0.0, row - 1, row)
     share = along / task.desired_path.length[row]
     share = np.where(along < 0.0, 1.0 + share, share)
     place = commands_on_rounded_path(task, row, share).position
     unrounded = commands_on_path(task, row, share).position if ramps.arc.any() else place
     tangent = original(task, row, share)[1]
-    shape = (len(ramps.row), PLACES, 3)
+    shape = (len(ramps.row), places, 3)
     place, unrounded, tangent = place.reshape(shape), unrounded.reshape(shape), tangent.reshape(shape)
     turn = np.stack([np.zeros(len(first)), ramps.end], axis=1)
     # the points before the vertex, or it, and after those of the ramp
     before = np.where(ramps.exact, ramps.vertex, ramps.vertex - 1)
     far = division.command[before].position, division.command[ramps.after].position
-    stop = first + step * (PLACES - 1)
+    stop = first + step * (places - 1)
     away = [np.sum((far[k] - place[:, -k]) * tangent[:, -k], axis=1) for k in (0, 1)]
     ends = np.stack([first + np.minimum(away[0], -step), stop + np.maximum(away[1], step)], axis=1)
     for side, (motion, row) in enumerate(((before, ramps.row - 1), (ramps.after, ramps.row))):
