@@ -40,13 +40,12 @@ def implausible_chips(
         if not wrong.any():
             continue
         at = int(np.argmax(wrong))
-        turning = f"the spindle of tool {cutter.number} turns at {abs(speed[at]) * 30 / np.pi:.4g} 1/min"
-        stated = "" if process.edges[cutter.number].speed is None else ", as the process file states"
+        stated = "" if process.edges[cutter.number].speed is None else " as the process file states"
         feed = toolpath.feed[sweeps.motion[at]] / MM * 60
         message = (
-            f"{turning} here{stated}: with {cutter.teeth} teeth and F {feed:.4g} mm/min the feed per tooth is"
-            f" {chip[at] / MM:.3g} mm, and in {len(np.unique(sweeps.motion[wrong]))} motions that cut an"
-            " implausible one"
+            f"tool {cutter.number} has a feed per tooth of {chip[at] / MM:.3g} mm here (spindle"
+            f" {abs(speed[at]) * 30 / np.pi:.4g} 1/min{stated}, F {feed:.4g} mm/min, {cutter.teeth} teeth), and in"
+            f" {len(np.unique(sweeps.motion[wrong]))} motions that cut an implausible one"
         )
         help = _advice(cutter, chip, speed, large, wrong)
         findings.append(Finding("STK024", message, program, int(toolpath.line[sweeps.motion[at]]), help=help))
