@@ -167,7 +167,7 @@ def test_a_blank_beside_its_place_is_reported(folder, shift):
     (one,) = found["STK032"]
     side = "low" if shift > 0 else "high"
     assert (
-        f"4 passes of tool 1 (lines 5 to 17) go up to 60 mm beyond the {side} side of the blank in X"
+        f"4 passes of tool 1 (lines 5 to 17) reach up to 60 mm beyond the {side} side of the blank in X"
         in one["message"]
     )
     assert "end inside of it at the other side, at least 40 mm before it" in one["message"]

@@ -258,8 +258,8 @@ CODES = define(
         ),
         "STK032": Code(
             "warning",
-            "passes leave the blank at one side only",
-            meaning="Parallel passes go at a feed by more than two diameters beyond one side of the blank, and all end"
+            "passes reach beyond one side of the blank only",
+            meaning="Parallel passes reach at a feed by more than two diameters beyond one side of the blank, and all end"
             " inside of it at the other.",
             consequence="The blank is probably stated beside its place: the program cuts air, and forces that are not"
             " there are corrected.",

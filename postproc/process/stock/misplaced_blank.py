@@ -116,7 +116,7 @@ def _one_sided(
                 continue
             line = toolpath.line[passes.row[np.flatnonzero(along)[far]]]
             message = (
-                f"{far.sum()} passes of tool {cutter.number} (lines {line.min()} to {line.max()}) go up to"
+                f"{far.sum()} passes of tool {cutter.number} (lines {line.min()} to {line.max()}) reach up to"
                 f" {here[far].max() / MM:.4g} mm beyond the {side} side of the blank in {name}, and all end inside of"
                 f" it at the other side, at least {-there[far].max() / MM:.4g} mm before it"
             )
