@@ -73,6 +73,7 @@ def told(motion: Executed) -> str:
         out += f" feed {number(motion.feed)}"
     if motion.axes is None and motion.approximation != 0:
         out += " round " + ("otherwise" if motion.approximation is None else number(motion.approximation))
+    out += f" force {motion.force}" if motion.force else ""
     return out + (f" {motion.ori_type}" if motion.ori_type not in (None, "#VAR") else "")
 
 
@@ -164,6 +165,7 @@ $TOOL={{X 0,Y 0,Z 100,A 0,B 0,C 0}}
 $VEL.CP=0.1
 $APO.CDIS=2
 PTP {{A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}}
+;FORCE 10 0 0
 LIN {{Z 5}}
 LIN {FULL} C_DIS
 FOR i=1 TO 3
@@ -180,6 +182,7 @@ FAULTS = {
     "axes": fault(lambda r: replace(r, axes=shifted(r.axes, 1e-6)), lambda r: r.axes is not None),
     "partial": fault(lambda r: replace(r, partial=r.partial + 1e-5), lambda r: r.partial is not None),
     "origin": fault(lambda r: replace(r, origin=shifted(r.origin, 1e-6)), lambda r: r.partial is not None),
+    "force": fault(lambda r: replace(r, force=""), lambda r: r.force != ""),
     "kind": fault(lambda r: replace(r, kind="SPL"), on_pose),
     "feed": fault(lambda r: replace(r, feed=r.feed + 0.001), on_pose),
     "approximation": fault(lambda r: replace(r, approximation=1.5), lambda r: r.approximation > 0),
@@ -187,7 +190,7 @@ FAULTS = {
     "arc": fault(lambda r: replace(r, arc=(*r.arc[:2], r.arc[2] + 0.01)), lambda r: r.arc is not None),
     "missing": lambda *of: [row for row in read_claims(*of) if row.kind != "CIRC"],
     "never": lambda *of: [replace(row, claimed=False, never=True) for row in read_claims(*of)],
-    "one pass": lambda *of: [row for row in read_claims(*of) if row.line != 11 or row.position[0] == 1],
+    "one pass": lambda *of: [row for row in read_claims(*of) if row.line != 12 or row.position[0] == 1],
     "passes backwards": lambda *of: read_claims(*of)[::-1],
 }
 
@@ -256,6 +259,16 @@ def altered(pattern: str, by: str) -> Callable:
     return reader
 
 
+def in_text(src: str, dat: str, config: str, tables: Tables) -> list[Claim]:
+    """A reader to which the last FORCE comment above a motion in the text is in force there."""
+    last, forces = "", [""]
+    for line in src.splitlines():
+        said = re.match(r"\s*;FORCE (.*)", line)
+        last = last if said is None else said[1].replace("OFF", "")
+        forces.append(last)
+    return [replace(row, force=forces[row.line]) for row in read_claims(src, dat, config, tables)]
+
+
 CARELESS = {
     "inputs are true": (altered(r"\$IN\s*\[[^\]]*\]", "TRUE"), 0.3),
     "inputs are false": (altered(r"\$IN\s*\[[^\]]*\]", "FALSE"), 0.3),
@@ -264,6 +277,7 @@ CARELESS = {
     "no frame is set in a table": (altered(r"^\s*(BASE|TOOL)_DATA\s*\[.*$", ""), 0.02),
     "no subprogram is called": (altered(r"^\s*sub\d\s*\(.*$", ""), 0.05),
     "no record of frames is taken": (altered(r"^\s*FDAT_ACT\s*=.*$", "FDAT_ACT={TOOL_NO 1,BASE_NO 1}"), 0.05),
+    "comments follow the text": (in_text, 0.1),
     "nothing comes later": (altered(r"^\s*(TRIGGER|INTERRUPT)\b.*$", ""), 0.02),
     "what a call gets is its own": (altered(r":\s*OUT|(?<=,p)(?=\))", ":IN"), 0.02),
 }

@@ -148,7 +148,7 @@ def test_what_is_taken_back_leaves_nothing_behind() -> None:
     text = ";FORCE 0 0 1\ni=0\nWHILE i<5\n;a word\n;FORCE 0 0 2\nLIN {X 5}\n"
     text += "r=1\ni=i+1\nIF i==3 THEN\ni=$IN[1]\nENDIF\nENDWHILE\n"
     found = body(text + "LIN {X 7,Y 0,Z 0,A 0,B 0,C 0}\n")
-    assert codes(found) == ["KRL004"]
+    assert codes(found) == ["KRL004", "KRL036"]  # the loop may not run at all
     assert len(found.toolpath) == 3
     assert [note.row for note in found.toolpath.annotations] == [1, 1]
     assert [note.text for note in found.toolpath.comments] == ["a word"]

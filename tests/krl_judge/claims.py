@@ -32,7 +32,7 @@ class Claim:
     claimed: its target is said to be known and can be corrected.  never: it is said not to run; apart: it is not said
     after which motion it runs, if it does.  position (3,),
     rotation (3, 3) or None; partial: X .. C of a target whose NaN components are what the axis angles ``origin`` give;
-    base, tool: (4, 4), None where not known.
+    base, tool: (4, 4), None where not known.  force: of the last FORCE comment before it, "" for none and for OFF.
     """
 
     line: int
@@ -51,6 +51,7 @@ class Claim:
     approximation: float
     orientation: str
     arc: tuple[np.ndarray, np.ndarray, float] | None
+    force: str
 
 
 def read_claims(src: str, dat: str, config: str, tables: Tables) -> list[Claim]:
@@ -60,7 +61,7 @@ def read_claims(src: str, dat: str, config: str, tables: Tables) -> list[Claim]:
     references = (Document(Path("$config.dat"), config.encode("latin-1")),) if config else ()
     program = DIALECTS["krl"].read(tuple(documents), ReadingSettings(references=references))
     tables = _without_stated(tables, config)
-    return [_claim(program.toolpath, row, tables) for row in range(len(program.toolpath))]
+    return _claims(program.toolpath, tables)
 
 
 def read_split_claims(src: str, dat: str, config: str, tables: Tables) -> list[Claim]:
@@ -72,7 +73,7 @@ def read_split_claims(src: str, dat: str, config: str, tables: Tables) -> list[C
     document = Document(Path("part.src"), main.encode("latin-1"))
     program = DIALECTS["krl"].read((document,), ReadingSettings(siblings=siblings))
     tables = _without_stated(tables, config)
-    return [_claim(program.toolpath, row, tables) for row in range(len(program.toolpath))]
+    return _claims(program.toolpath, tables)
 
 
 def _without_stated(tables: Tables, config: str) -> Tables:
@@ -86,10 +87,20 @@ def split(src: str) -> tuple[str, dict[str, str]]:
     starts = [found.start() for found in _ROUTINE.finditer(src)] + [len(src)]
     texts = [src[start:stop] for start, stop in pairwise(starts[1:])]
     names = [_ROUTINE.match(text)[1].lower() for text in texts]  # type: ignore[index]
-    return src[: starts[1]], dict(zip(names, texts, strict=True))
+    return src[: (*starts, len(src))[1]], dict(zip(names, texts, strict=True))
 
 
-def _claim(path: Toolpath, row: int, tables: Tables) -> Claim:
+def _claims(path: Toolpath, tables: Tables) -> list[Claim]:
+    forces = [""] * len(path)
+    for comment in path.annotations:
+        word, _, said = comment.text.partition(" ")
+        if word.upper() == "FORCE":
+            said = "" if said.upper() == "OFF" else said
+            forces[comment.row :] = [said] * len(forces[comment.row :])
+    return [_claim(path, row, tables, force) for row, force in enumerate(forces)]
+
+
+def _claim(path: Toolpath, row: int, tables: Tables, force: str) -> Claim:
     refused = path.constraints.refused.get(row)
     from_row = int(path.partial_targets.inherits_from_row[row])
     on_axes = bool(path.on_axes[row])
@@ -113,6 +124,7 @@ def _claim(path: Toolpath, row: int, tables: Tables) -> Claim:
         arc=(path.arcs.centre[row] / MM, path.arcs.normal[row], float(path.arcs.sweep[row]) / DEG)
         if np.isfinite(path.arcs.sweep[row])
         else None,
+        force=force,
     )
 
 

@@ -205,6 +205,8 @@ def differs(row: Claim, motion: Executed) -> str:
                 return f"{name}: it is not set"
             if not _same_place(claimed, matrix(dict(zip(FRAME, true, strict=True)))):
                 return f"{name}: {np.round(claimed[:3, 3], 6)}, it is {true}"
+    if row.force != motion.force:
+        return f"force: {row.force!r}, it is {motion.force!r}"
     why = _target(row, motion)
     if why or motion.kind in ("AXIS", "PTP"):
         return why

@@ -306,6 +306,9 @@ class Machine(Events):
         following = line.tokens[1][1] if len(line.tokens) > 1 else ""
         if word == ";label":
             return at + 1
+        if word == ";force":
+            self.robot.force = "" if following.upper() == "OFF" else following
+            return at + 1
         if following in ("=", ".", "[") and word not in ("DECL",):
             place = reader.place(reader.name())
             reader.expect("=")

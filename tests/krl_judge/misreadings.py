@@ -456,4 +456,73 @@ MISREADINGS = (
             "DECL jobtype job={P {X 1,Y 2,Z 3,A 4,B 5,C 6},count 3}\nDECL jobtype jobs[2]\nENDDAT\n",
         ),
     ),
+    Misreading(
+        "a force behind a condition",
+        "A FORCE comment that is passed, or not, as an input decides is in force behind the condition too.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "IF $IN[1] THEN\n"
+            ";FORCE 1 0 0\n"
+            "ENDIF\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n",
+            inputs=({1: (False,)}, {1: (True,)}),
+        ),
+    ),
+    Misreading(
+        "a force that a return goes past",
+        "A FORCE comment before a RETURN is in force behind it.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "sub()\n"
+            "END\n"
+            "DEF sub()\n"
+            "IF $IN[1] THEN\n"
+            ";FORCE 1 0 0\n"
+            "RETURN\n"
+            "ENDIF\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n",
+            inputs=({1: (False,)}, {1: (True,)}),
+        ),
+    ),
+    Misreading(
+        "a force of the last pass",
+        "A FORCE comment at the end of a loop is not in force at its start.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "REPEAT\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            ";FORCE 1 0 0\n"
+            "UNTIL $IN[1]\n"
+            "END\n",
+            inputs=({1: (False, True)}, {1: (True,)}),
+        ),
+    ),
+    Misreading(
+        "a force that an interrupt states",
+        "A FORCE comment in a routine that an interrupt runs is not in force behind it.",
+        Case(
+            "DEF part()\n"
+            "INTERRUPT DECL 8 WHEN $IN[2]==TRUE DO away()\n"
+            "INTERRUPT ON 8\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            ";FORCE 1 0 0\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "LIN {X 1,Y 2,Z 5,A 4,B 5,C 6}\n"
+            "LIN {X 1,Y 2,Z 7,A 4,B 5,C 6}\n"
+            "END\n"
+            "DEF away()\n"
+            ";FORCE OFF\n"
+            "END\n",
+            inputs=({2: (True,)},),
+        ),
+    ),
 )

@@ -20,7 +20,8 @@ class Executed:
     kind: PTP, AXIS, LIN or CIRC.  target: X, Y, Z, A, B, C [mm, deg] in the base, None where it is what the axis angles
     ``origin`` of an earlier motion give, NaN where the language leaves it open; axes: of AXIS.  base, tool: X .. C,
     None where nothing has set them.  feed [m/s]: None where not set; approximation [mm]: 0 for none, NaN where not set,
-    None where it is not by a distance; ori_type: None where not set.  arc: centre, normal, sweep [deg].
+    None where it is not by a distance; ori_type: None where not set.  arc: centre, normal, sweep [deg].  force: of the
+    FORCE comment that was passed last, "" for none and for OFF.
     """
 
     line: int
@@ -34,6 +35,7 @@ class Executed:
     approximation: float | None = 0.0
     ori_type: str | None = None
     arc: tuple[np.ndarray, np.ndarray, float] | None = None
+    force: str = ""
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@
     spline     = SPLINE, then SPL and SLIN to full and partial points, ENDSPLINE
     jump       = IF .. THEN GOTO over what follows, or back as long as a counter or an input says
     form       = an inline form: FDAT, LDAT or PDAT, BAS(#CP_PARAMS,..), a point of the .dat
+    comment    = FORCE n 0 0, FORCE OFF between any two statements of a half of the programs
     idle       = HALT, WAIT SEC, WAIT FOR, $OUT[n]= (all stop the advance run), behind CONTINUE or not; a comment
     state      = $VEL.CP, $APO.CDIS, $ORI_TYPE, BAS(#VEL_CP,..), $OV_PRO
 
@@ -27,6 +28,9 @@ Every local variable is set before it is read, as far as the flow does not skip 
 """
 
 from __future__ import annotations
+
+import random
+from itertools import pairwise
 
 from .data import MODULE_FRAMES, MODULE_INTS, MODULE_REALS
 from .further import Further
@@ -38,6 +42,9 @@ from .spelling import Spelling
 class Generator(Further):
     def __init__(self, seed: int) -> None:
         super().__init__(seed)
+        self.forces = random.Random(
+            -1 - seed
+        )  # of its own: the programs of a seed are the same without comments
         self.lines: list[str] = []
         self.labels = 0
         self.module = self.rng.random() < 0.5
@@ -67,6 +74,7 @@ class Generator(Further):
             self.lines += ["DEFFCT INT twice(v:IN)", "INT v", *does, "RETURN 2*v", "ENDFCT"]
         if self.has_frame_function:
             self.lines += self.functions()
+        self.lines = with_forces(self.lines, self.forces)
         spelling = Spelling(rng)
         src = "".join(spelling.line(line) + "\n" for line in self.lines)
         dat = "".join(spelling.line(line) + "\n" for line in self.dat())
@@ -517,3 +525,17 @@ class Generator(Further):
         if self.rng.random() < 0.2:
             out += [f"IF v>{self.rng.randint(0, 5)} THEN", "RETURN", "ENDIF"]
         return out
+
+
+def with_forces(lines: list[str], rng: random.Random) -> list[str]:
+    """The program with FORCE comments between its statements, if it gets some."""
+    if rng.random() < 0.5:
+        return lines
+    share, out = rng.choice([0.02, 0.06, 0.2]), []
+    for line, following in pairwise([*lines, "END"]):
+        out.append(line)
+        word = line.partition(" ")[0]
+        inside = not line.startswith("&") and word not in ("END", "ENDFCT", "CONTINUE", "SWITCH", "GLOBAL")
+        if inside and not following.startswith(("DEF ", "DEFFCT")) and rng.random() < share:
+            out.append(rng.choice([f";FORCE {rng.randint(1, 3)} 0 0", ";FORCE OFF"]))
+    return out

@@ -38,6 +38,7 @@ class Robot:
         self.system = {name: new_cell(of, STRUCTURES) for name, of in SYSTEM.items()}
         self.executed: list[Executed] = []
         self.end = End()
+        self.force = ""
 
     def bas(self, command: object, number: object) -> None:
         """KUKA's routine that sets what most programs begin with."""
@@ -139,7 +140,7 @@ class Robot:
                 line, motion.kind, target, None, base, tool, origin,
                 feed=self.speed(),
                 approximation=self.distance(motion.rounds),
-                ori_type=str(ori_type) if ori_type is not None else None, arc=found_arc,
+                ori_type=str(ori_type) if ori_type is not None else None, arc=found_arc, force=self.force,
             )
         )  # fmt: skip
         angles = target[3:]
@@ -154,7 +155,9 @@ class Robot:
             axes = tuple(v + (o or 0.0) for v, o in zip(self.end.axes, own, strict=True))
         else:
             axes = way.fill(own, self.end.axes)
-        self.executed.append(Executed(line, "AXIS", (None,) * 6, axes, base, tool, approximation=None))
+        self.executed.append(
+            Executed(line, "AXIS", (None,) * 6, axes, base, tool, approximation=None, force=self.force)
+        )
         known = not any(math.isnan(a) for a in axes)
         self.end = End((None if known else NAN,) * 6, axes, axes if known else None, base, tool)
 

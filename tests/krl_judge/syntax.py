@@ -15,6 +15,9 @@ _TOKEN = re.compile(
 )
 
 
+_FORCE = re.compile(r"[ \t]*;[ \t]*FORCE[ \t]+(.*?)[ \t]*\Z", re.I)
+
+
 def tokens(line: str) -> list[tuple[str, str]]:
     """(kind, text) of a line without its comment; names, words and numbers in upper case."""
     out, at = [], 0
@@ -225,6 +228,8 @@ def routines(text: str) -> list[Routine]:
             continue
         found = tokens(line)
         if not found:
+            if open_ and (force := _FORCE.match(line)):
+                out[-1].lines.append(Line(number, [("name", ";force"), ("text", force[1])]))
             continue
         words = [text for _, text in found[:3]]
         if words[0] == "GLOBAL" and words[1:2] in (["DEF"], ["DEFFCT"]):

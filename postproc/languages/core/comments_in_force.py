@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Protocol
 
@@ -26,6 +27,37 @@ VARYING = Varying.VARYING
 class Comment(Protocol):
     @property
     def text(self) -> str: ...
+
+
+@dataclass(frozen=True, slots=True)
+class CommentInForce:
+    """A comment that is in force: the same as another one that states the same, in blanks and letters of any kind."""
+
+    statement: str
+    text: str = field(compare=False)
+    line: int = field(compare=False)
+
+    @classmethod
+    def of(cls, text: str, line: int) -> CommentInForce:
+        return cls(" ".join(text.upper().split()), text, line)
+
+    @property
+    def is_off(self) -> bool:
+        return self.statement == "FORCE OFF"
+
+
+InForce = CommentInForce | Varying | None
+"""A comment in force, None before the first one."""
+
+
+def join_comments(one: InForce, other: InForce) -> InForce:
+    """What is in force where two paths meet; before the first comment no force acts, as under FORCE OFF."""
+    if one == other:
+        return one
+    for first, second in ((one, other), (other, one)):
+        if first is None and isinstance(second, CommentInForce) and second.is_off:
+            return None
+    return VARYING
 
 
 def place_of(text: str) -> str:

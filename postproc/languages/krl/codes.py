@@ -296,5 +296,13 @@ CODES = define(
             action="State CONTINUE before the statement, or use TRIGGER, if the motion is to be approximated.",
             example="`$OUT[1]=TRUE` between two `LIN ... C_DIS`.",
         ),
+        "KRL036": Code(
+            "warning",
+            "force comment differs with the path of the program",
+            meaning="Several FORCE or COMPENSATE comments may be in force at the motion.",
+            consequence="Which force acts there is not known, so the motion is not corrected.",
+            action="Repeat the comment before the motion.",
+            example="A motion after an IF in which `;FORCE 0 100 0` is.",
+        ),
     }
 )

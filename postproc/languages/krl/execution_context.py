@@ -26,7 +26,7 @@ from postproc.languages.krl.other_modules import OtherModules
 from postproc.languages.krl.program_blocks import Block, Routine
 from postproc.languages.krl.program_structure import ProgramStructure
 from postproc.languages.krl.spatial import ZERO
-from postproc.languages.krl.statement_effects import Effect, Effects
+from postproc.languages.krl.statement_effects import COMMENTS, Effect, Effects
 from postproc.languages.krl.target import COMPONENTS, FrameEntry, KrlTarget, UnknownValue, known, shown
 from postproc.languages.krl.variables import VariableFacts, Variables
 from postproc.languages.krl.vectorised import Item
@@ -61,11 +61,10 @@ class ExecutionContext:
     ``followed``: routines that ran.  ``idle``: what no flow leads to is listed.  ``opaque``: the block, if any, whose
     structure is not understood.  ``spline``: the spline block that is open.  ``has_tcp_mode``, ``has_turning``: some
     line names another interpolation mode, or another way of turning the tool, than the usual one; ``has_override``:
-    some line names a speed override.  ``initial``: what
-    holds where the program starts.  ``root_set``, ``later_since``, ``later_speed``, ``moved_later``,
-    ``ended_later``: what ``ModalState`` calls so.  ``others``: the modules read besides; ``effects_of_others``:
-    what their routines change of what this one knows; ``unread``: routines that are called and not read; ``depth``: how
-    many calls of other modules lead here.
+    some line names a speed override.  ``initial``: what holds where the program starts.  ``root_set``, ``later_since``,
+    ``later_speed``, ``moved_later``, ``ended_later``, ``later_comments``: what ``ModalState`` calls so.
+    ``others``: the modules read besides; ``effects_of_others``: what their routines change of what this one knows;
+    ``unread``: routines that are called and not read; ``depth``: how many calls of other modules lead here.
     """
 
     document: Document
@@ -98,6 +97,7 @@ class ExecutionContext:
     later_speed: frozenset[Effect] = frozenset()
     moved_later: int = 0
     ended_later: int = 0
+    later_comments: frozenset[Effect] = frozenset()
     unread: set[bytes] = field(default_factory=set)
     depth: int = 0
 
@@ -122,6 +122,8 @@ class ExecutionContext:
             self.moved_later = self.moved_later or line
             self.state.moved_later = self.state.moved_later or line
             self.state.unsettle(self.has_tcp_mode, self.has_turning)
+        self.later_comments |= effects & COMMENTS
+        self.state.later_comments |= self.later_comments
         if "resume" in effects:
             self.ended_later = self.ended_later or line
             self.state.ended_later = self.state.ended_later or line
@@ -140,6 +142,7 @@ class ExecutionContext:
             self.state.forget({"point"}, why, self.has_tcp_mode, self.has_turning)
             return
         words = {effect for effect in effects if isinstance(effect, str)}
+        words -= COMMENTS - self.structure.effects
         self.state.forget(words, why, self.has_tcp_mode, self.has_turning)
         if "override" in words and self.has_override:
             self.state.overridden = OVERRIDES

@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
+from postproc.languages.core.comments_in_force import VARYING, InForce, join_comments
 from postproc.languages.core.field_joins import SOMETIMES, FieldJoins, either, is_same, lost
 from postproc.languages.core.frame_table import FrameTable
 from postproc.languages.core.motion_sources import ELSEWHERE, START, Source
@@ -129,7 +130,9 @@ class ModalState:
     the world; later_since: the line, if any, from which on an interrupt or a trigger may change base or tool;
     later_speed: which of "feed" and "apo" one may change; moved_later, ended_later: the line, if any, from which on one
     may move the robot, or end what a call runs (RESUME); stop: whether the advance run stops before the next motion,
-    no_advance: before every one: 2 where it does, 1 where it may; overridden: speed overrides that may not be 100 %.
+    no_advance: before every one: 2 where it does, 1 where it may; overridden: speed overrides that may not be 100 %;
+    force, switch: the FORCE and COMPENSATE comments in force; later_comments: which of these an interrupt
+    or a trigger may change.
     """
 
     base: FrameIndex | UnknownValue = NO_BASE
@@ -161,6 +164,15 @@ class ModalState:
     moved_later: int = 0
     ended_later: int = 0
     overridden: frozenset[bytes] = frozenset()
+    force: InForce = None
+    switch: InForce = None
+    later_comments: frozenset[Effect] = frozenset()
+
+    @property
+    def comments(self) -> tuple[InForce, InForce]:
+        """The FORCE and COMPENSATE comments in force, whatever an interrupt or a trigger may run."""
+        force, switch = (VARYING if name in self.later_comments else None for name in ("force", "switch"))
+        return self.force if force is None else force, self.switch if switch is None else switch
 
     @property
     def steady_feed(self) -> float:
@@ -214,6 +226,10 @@ class ModalState:
             self.tool_known = True
         if "turning" in words and has_turning:
             self.orientation, self.arc_frame = OrientationMode.UNKNOWN, ArcFrame.UNKNOWN
+        if "force" in words:
+            self.force = VARYING
+        if "switch" in words:
+            self.switch = VARYING
         if "record" in words:
             self.frames_record = self.path_record = self.axis_record = None
 
@@ -298,5 +314,8 @@ _JOINS = FieldJoins(
         "moved_later": either,
         "ended_later": either,
         "point_line": lambda one, other: one,
+        "later_comments": frozenset.union,
+        "force": join_comments,
+        "switch": join_comments,
     }
 )

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from postproc.base.arrays import Floats
 from postproc.base.document import Document
+from postproc.languages.core.comments_in_force import InForce
 from postproc.languages.core.motion_sources import Meeting, Source
 from postproc.languages.krl.external_axes import UNSTATED, carried_on, six
 from postproc.languages.krl.modal_state import Anchor, FrameIndex, ModalState
@@ -77,6 +78,7 @@ class MotionRows:
     ``calls``: the count of rows, and after which ones a routine of another module moves the robot.
     ``unfollowed_ends``: where routines end after which it is not known what runs.
     ``never_from``: the first row of those that never run.
+    ``in_force``: rows from which on other FORCE and COMPENSATE comments are in force -> these.
     """
 
     document: Document
@@ -101,6 +103,7 @@ class MotionRows:
     reads: list[tuple[int, frozenset[Source]]] = field(default_factory=list)
     meetings: defaultdict[bytes, Meeting] = field(default_factory=lambda: defaultdict(Meeting))
     annotations: list[Annotation] = field(default_factory=list)
+    in_force: dict[int, tuple[InForce, InForce]] = field(default_factory=dict)
     comments: list[Annotation] = field(default_factory=list)
     passing: dict[int, bool] = field(default_factory=dict)
     entries: dict[int, int] = field(default_factory=dict)
@@ -151,8 +154,15 @@ class MotionRows:
         if state.stop:
             self.stopped[self.count] = state.stop
             state.stop = 0
+        self._note_comments(state.comments)
         if len(sources) != 1 or self.count - 1 not in sources:
             self.sources_of[self.count] = sources
+
+    def _note_comments(self, in_force: tuple[InForce, InForce]) -> None:
+        """Notes the comments in force at the next row, if they are not those of the row before, or some precede it."""
+        last = self.in_force[next(reversed(self.in_force))] if self.in_force else (None, None)
+        if in_force != last or (self.annotations and self.annotations[-1].row == self.count):
+            self.in_force[self.count] = in_force
 
     def note_call(self, sources: frozenset[Source]) -> None:
         """Notes that after these a routine of another module moves the robot first."""
@@ -176,7 +186,7 @@ class MotionRows:
         for sparse in (
             self.anchors, self.reasons, self.variables, self.locked, self.arcs, self.relative,
             self.no_insert_before, self.approximated, self.builds_on,
-            self.passing, self.entries, self.sources_of, self.stopped,
+            self.passing, self.entries, self.sources_of, self.stopped, self.in_force,
         ):  # fmt: skip
             while sparse and next(reversed(sparse)) >= count:
                 sparse.popitem()

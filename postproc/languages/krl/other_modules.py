@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from postproc.base.byte_search import occurs
 from postproc.base.document import Document
+from postproc.languages.core.comments_in_force import VARYING
 from postproc.languages.core.motion_sources import ELSEWHERE, START
 from postproc.languages.krl.aliases import parameters_of
 from postproc.languages.krl.data import (
@@ -256,6 +257,7 @@ def visible(modules: OtherModules, declarations: Declarations) -> dict[bytes, Ef
 def state_at_entry(state: ModalState, frames: FrameRegister, inner: FrameRegister) -> ModalState:
     """What a called routine starts with."""
     entry = ModalState(**{name: getattr(state, name) for name in MODAL_FIELDS})
+    entry.force, entry.switch = state.force, state.switch
     entry.base, entry.tool = (_moved(one, frames, inner, 0) for one in (state.base, state.tool))
     return entry
 
@@ -277,6 +279,9 @@ def take_exit(
     entry = state.base, state.tool
     for name in MODAL_FIELDS:
         setattr(state, name, getattr(exit, name))
+    for name in ("force", "switch"):
+        comment = getattr(before, name)
+        setattr(state, name, comment if getattr(exit, name) == comment else VARYING)
     state.stop = exit.stop if left.moves else max(before.stop, exit.stop)
     state.base, state.tool = (_moved(one, inner, frames, line) for one in (exit.base, exit.tool))
     if isinstance(state.base, UnknownValue):

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import re
 from dataclasses import replace
 
+from postproc.languages.core.comments_in_force import CommentInForce, place_of
 from postproc.languages.core.motion_sources import ELSEWHERE
 from postproc.languages.core.waits import Waits
 from postproc.languages.krl import motions
@@ -47,6 +47,8 @@ from postproc.languages.krl.other_modules import (
 from postproc.languages.krl.program_blocks import Routine
 from postproc.languages.krl.program_structure import INLINE, closure
 from postproc.languages.krl.statement_effects import (
+    ANNOTATION,
+    COMMENTS,
     EVERYTHING,
     HIDDEN,
     Effect,
@@ -59,8 +61,6 @@ from postproc.languages.krl.statement_effects import (
 from postproc.languages.krl.vectorised import Item, VectorisedLines
 from postproc.toolpath import Annotation
 from postproc.toolpath.meant_comments import meant_to_speak
-
-_ANNOTATION = re.compile(rb";[ \t]*(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
 
 _WAITS = tuple(Waits)
 
@@ -151,9 +151,11 @@ class ProgramFlow(Calls):
         run.state = ModalState(sources=frozenset([callers]), stop=Waits.MAYBE)
         run.state.root_set, run.state.later_since = run.root_set, run.later_since
         run.state.later_speed, run.state.ended_later = run.later_speed, run.ended_later
-        run.state.moved_later = run.moved_later
+        run.state.moved_later, run.state.later_comments = run.moved_later, run.later_comments
         run.walked = True
-        run.forget(EVERYTHING - {"all"}, f"at the start of the subprogram of line {routine.line}")
+        called_here = routine.name in self.text_called or routine.name in run.structure.later
+        unknown = EVERYTHING - {"all"} | (COMMENTS if called_here else set())
+        run.forget(unknown, f"at the start of the subprogram of line {routine.line}")
         run.routine = routine
         self.reset()
         first = len(run.rows)
@@ -346,8 +348,9 @@ class ProgramFlow(Calls):
             state.form = InlineFormState((state.base, state.tool))
         text = item.comment[1:].decode("latin-1").strip()
         note = Annotation(len(run.rows), text, item.line)
-        if _ANNOTATION.match(item.comment):
+        if ANNOTATION.match(item.comment):
             run.rows.annotations.append(note)
+            setattr(run.state, place_of(text), CommentInForce.of(text, item.line))
         elif item.kind == StatementKind.COMMENT or meant_to_speak(text):
             self.comments.setdefault(item.line, note)
 

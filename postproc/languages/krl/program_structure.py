@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from postproc.languages.core.comments_in_force import place_of
 from postproc.languages.core.reach import reached
 from postproc.languages.krl.aliases import Handed, Parameters, parameters_of, spread
 from postproc.languages.krl.later_changes import EVENTS, later_actions, later_functions
@@ -26,6 +27,7 @@ from postproc.languages.krl.lexing import (
 )
 from postproc.languages.krl.program_blocks import Block, Routine
 from postproc.languages.krl.statement_effects import (
+    ANNOTATION,
     HERE,
     MODAL,
     SYSTEM,
@@ -115,6 +117,11 @@ class _Surveyor:
 
     def take(self, index: int, statement: Statement) -> None:
         kind, stack = statement.kind, self.stack
+        if statement.comment and ANNOTATION.match(statement.comment):
+            changed = place_of(statement.comment[1:].decode("latin-1").strip())
+            self.found.effects.add(changed)
+            if stack:
+                stack[-1].effects.add(changed)
         if kind not in (StatementKind.MOTION, StatementKind.COMMENT) and not is_well_formed(statement):
             self._ill_formed(statement)
         if stack and stack[-1].word == b"SWITCH" and not stack[-1].branches:

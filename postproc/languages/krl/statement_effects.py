@@ -1,8 +1,8 @@
 """What a statement changes, reads and calls.
 
-An effect is a word ("point", "base", "tool", "feed", "apo", "mode", "turning", "root", "record", "override", "resume"
-for the end of calls that are under way, "all" for every variable that the program assigns) or the name (bytes) of a
-variable that is assigned.
+An effect is a word ("point", "base", "tool", "feed", "apo", "mode", "turning", "root", "record", "override", "force",
+"switch" of the FORCE and COMPENSATE comments, "resume" for the end of calls that are under way, "all" for every
+variable that the program assigns) or the name (bytes) of a variable that is assigned.
 """
 
 from __future__ import annotations
@@ -34,6 +34,9 @@ HERE = frozenset([b"$AXIS_ACT", b"$POS_ACT"])
 
 READS_POSITION = re.compile(rb"\$(?:POS|AXIS)_(?:ACT|FOR|BACK|INT|RET)", re.I)
 
+ANNOTATION = re.compile(rb";[ \t]*(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
+"""A comment that states a force or what is compensated."""
+
 HARMLESS = frozenset(
     b"USERSPOT USER_GRP H50 H70 A10 A20 A10_INI DELMENS IR_STOPM P00 PULSE CWRITE CREAD SREAD SWRITE COPEN CCLOSE "
     b"CAST_TO CAST_FROM VARSTATE MBX_REC MSGNOTIFY MSGQUIT MSGDIALOG MSGLOOP ON_ERROR_PROCEED ERR_RAISE ERR_CLEAR "
@@ -58,6 +61,9 @@ MODAL: Effects = {"base", "tool", "feed", "apo", "mode", "turning"}
 """What BAS may set."""
 
 EVERYTHING: Effects = {"point", "record", "override", "all", *MODAL}
+
+COMMENTS: frozenset[Effect] = frozenset(["force", "switch"])
+"""What comments change that speak to this tool."""
 
 _FUNCTION = re.compile(rb"(?<![A-Za-z0-9_$#.'])(" + NAME + rb")[ \t]*\(")
 _WORDS = frozenset(

@@ -14,6 +14,7 @@ from postproc.base.units import DEG, MM
 from postproc.languages.core.motion_sources import ELSEWHERE, Meeting
 from postproc.languages.core.row_facts import OTHER_PATHS, LockedRows, axis_targets, grouped, used_frames
 from postproc.languages.krl.advance_run import stopped_motions
+from postproc.languages.krl.comments_at_rows import take_comments
 from postproc.languages.krl.controller_data import with_declared
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.motion_rows import MotionRows, RowRefusal
@@ -44,6 +45,7 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
     """``places``: whether they are wanted."""
     rows = run.rows
     run.code.clear()  # the table takes up its arrays one after the other
+    annotations = take_comments(rows)
     table = MotionTable(rows, places)
     single = single_sources(rows)
     _refuse_other_calls(run, table)
@@ -97,7 +99,7 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
         ),
         configuration=Configuration({"status": _read_only(table.status), "turn": _read_only(table.turn)}),
         orientation_control=OrientationControl(mode=_read_only(table.orientation)),
-        remarks=ProgramComments(tuple(rows.annotations), tuple(rows.comments)),
+        remarks=ProgramComments(annotations, tuple(rows.comments)),
     )
     found = None if table.spots is None else _places(rows, table, table.spots)
     return (

@@ -1,0 +1,80 @@
+"""FORCE and COMPENSATE comments of KRL where paths part and meet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from postproc.base.document import Document
+from postproc.languages import DIALECTS
+from postproc.languages.dialect import ReadingSettings
+
+LINE = "LIN {{X {},Y 2,Z 3,A 4,B 5,C 6}}\n"
+HEAD = "DEF part()\nBAS(#BASE,1)\nBAS(#TOOL,1)\n"
+
+
+def read(text: str, **others: str):
+    """Lines of motions with the comments in force: "?" where they differ with the path; and the findings."""
+    siblings = tuple(Document(Path(f"{name}.src"), body.encode()) for name, body in others.items())
+    document = Document(Path("part.src"), text.encode())
+    path = DIALECTS["krl"].read((document,), ReadingSettings(siblings=siblings)).toolpath
+    refused = {row for row, finding in path.constraints.refused.items() if finding.code == "KRL036"}
+    said = [""] * len(path)
+    for comment in path.annotations:
+        said[comment.row :] = [comment.text] * (len(path) - comment.row)
+    return [(line, "?" if row in refused else said[row]) for row, line in enumerate(path.line.tolist())], path
+
+
+@pytest.mark.parametrize("word", ["FORCE 1 0 0", "COMPENSATE OFF", "force 1,0,0"])
+def test_a_comment_that_is_passed_or_not(word):
+    text = f"{HEAD}IF $IN[1] THEN\n;{word}\nENDIF\n{LINE.format(1)};FORCE OFF\n;COMPENSATE ON\n{LINE.format(2)}END\n"
+    rows, path = read(text)
+    assert rows == [(7, "?"), (10, "COMPENSATE ON")]
+    assert "differs with the path" in path.constraints.refused[0].message
+
+
+def test_the_same_comment_on_all_paths_is_in_force():
+    branches = "IF $IN[1] THEN\n;FORCE 1 0 0\nELSE\n; force  1 0 0\nENDIF\n"
+    assert read(f"{HEAD}{branches}{LINE.format(1)}END\n")[0] == [(9, "force  1 0 0")]
+
+
+def test_off_in_a_branch_is_what_no_comment_is():
+    cut = f"IF $IN[1] THEN\n;FORCE 1 0 0\n{LINE.format(1)};FORCE OFF\nENDIF\n"
+    assert read(f"{HEAD}{cut}{LINE.format(2)}END\n")[0] == [(6, "FORCE 1 0 0"), (9, "FORCE OFF")]
+
+
+def test_a_comment_that_the_path_to_a_motion_goes_past_is_stated_again():
+    text = f"{HEAD}IF $IN[1] THEN\n;FORCE 3 0 0\n{LINE.format(3)}RETURN\nENDIF\n{LINE.format(4)}END\n"
+    rows, path = read(text)
+    assert rows == [(6, "FORCE 3 0 0"), (9, "?")]
+    assert "no FORCE comment is in force" in path.constraints.refused[1].message
+    text = text.replace(HEAD, f"{HEAD};FORCE 5 0 0\n")
+    assert read(text)[0] == [(7, "FORCE 3 0 0"), (10, "FORCE 5 0 0")]
+
+
+@pytest.mark.parametrize(
+    ("sub", "after"),
+    [
+        ("", "FORCE 1 0 0"), (";FORCE 2 0 0\n", "?"), (";FORCE 2 0 0\n;FORCE 1 0 0\n", "FORCE 1 0 0"),
+        ("IF $IN[1] THEN\n;FORCE OFF\nENDIF\n", "?"),
+    ],
+)  # fmt: skip
+def test_a_routine_of_another_module_with_comments(sub, after):
+    text = f"{HEAD};FORCE 1 0 0\nother()\n{LINE.format(1)}END\n"
+    rows, _ = read(text, other=f"DEF other()\n{sub}END\n")
+    assert rows == [(6, after)]
+
+
+def test_a_comment_that_an_interrupt_may_run():
+    text = f"{HEAD}INTERRUPT DECL 3 WHEN $IN[1] DO away()\n;FORCE 1 0 0\n{LINE.format(1)}END\nDEF away()\n"
+    assert read(f"{text}END\n")[0] == [(6, "FORCE 1 0 0")]
+    assert read(f"{text};FORCE OFF\nEND\n")[0] == [(6, "?")]
+
+
+def test_a_routine_that_others_call_too():
+    """A function is not followed: its motions run with the comments of any caller."""
+    start = f"{HEAD};FORCE 1 0 0\nIF f() THEN\nENDIF\nEND\nDEFFCT BOOL f()\nBAS(#BASE,1)\nBAS(#TOOL,1)\n"
+    end = f"{LINE.format(1)}RETURN TRUE\nENDFCT\n"
+    assert read(start + end)[0] == [(11, "?")]
+    assert read(f"{start};FORCE 2 0 0\n{end}")[0] == [(12, "FORCE 2 0 0")]
