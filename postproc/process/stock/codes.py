@@ -259,7 +259,7 @@ CODES = define(
         "STK032": Code(
             "warning",
             "passes reach beyond one side of the blank only",
-            meaning="Parallel passes reach at a feed by more than two diameters beyond one side of the blank, and all end"
+            meaning="Parallel passes reach more than two diameters beyond one side of the blank at a feed, and end"
             " inside of it at the other.",
             consequence="The blank is probably stated beside its place: the program cuts air, and forces that are not"
             " there are corrected.",
