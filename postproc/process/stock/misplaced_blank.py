@@ -143,7 +143,7 @@ def _first_level(cutter: Cutter, passes: _Passes, toolpath: Toolpath) -> Iterato
     at = int(first[np.argmax(depth[first])])
     if depth[at] > max(DEEPER * steps[0], steps[0] + _DEEPER_BY):
         message = (
-            f"tool {cutter.number} cuts {depth[at] / MM:.4g} mm deep in its first level (line"
+            f"tool {cutter.number} cuts {depth[at] / MM:.3g} mm deep in its first level (line"
             f" {toolpath.line[row[at]]}), and goes {steps[0] / MM:.4g} mm deeper in each of the next ones"
         )
         yield message, "compare the top of the blank with the zero point of the program"
