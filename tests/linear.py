@@ -366,7 +366,10 @@ def measure(case: Case, size: int, longest: int = LONGEST) -> Cost:
 
 def _measured(case: Case, size: int, longest: int, send) -> None:
     signal.setitimer(signal.ITIMER_PROF, longest)
-    gc.freeze()  # a collection would also visit, and copy, what the process that was forked held
+    # A collection would also visit, and copy, what the process that was forked held: it is the oldest generation, and
+    # not frozen, which a command of its own is not either (the reader then would not let it be looked over).
+    gc.freeze()
+    gc.unfreeze()
     text = case.text(size)
     with tempfile.TemporaryDirectory() as name:
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -123,6 +123,12 @@ def test_a_small_program_loads_what_it_needs(tmp_path):
     }
     rooms = {name.split(".")[1] for name in loaded if name.startswith("postproc.")}
     assert not rooms & {"placement", "learning", "diagnosis", "identification", "experiments", "verification"}
+    assert not rooms & {"measurements"}
+    assert not {name for name in loaded if name.startswith("postproc.process.stock.")} - {
+        "postproc.process.stock.codes",
+        "postproc.process.stock.stated_stock",
+    }
+    assert not {"pyexpat", "postproc.part.part_figures"} & set(loaded)
     assert "postproc.cli.program" in loaded
     assert not {f"postproc.cli.{name}" for name in COMMANDS} & set(loaded) - {
         "postproc.cli.program",

@@ -19,7 +19,7 @@ from postproc.languages.rapid.array_items import CHUNK, ArrayItems, repeated, wi
 from postproc.languages.rapid.parsing import ModuleParser
 from postproc.languages.rapid.propagation import Propagation
 from postproc.languages.rapid.routine_graph import RoutineGraph
-from postproc.languages.rapid.step_budget import MOST_IN_RUN, StepBudget
+from postproc.languages.rapid.step_budget import MOST_CALLS, MOST_IN_RUN, StepBudget
 from postproc.languages.rapid.values import GroupValue, Leaf, UnknownData, joined, plain, unknown_in
 from postproc.languages.tp.tp_propagation import TpPropagation
 from postproc.workflows.preparation import read_program
@@ -100,6 +100,43 @@ def test_calls_of_calls_are_followed_up_to_a_number_of_statements(taken, calls):
     assert len(taken) < 40 * MOST_IN_RUN
     [fact] = found.facts.values()
     assert (unknown_in(fact.target) is None) == (calls == 1)  # of many calls each has another n
+
+
+def test_a_call_that_changes_nothing_any_more_is_passed_where_it_is_repeated(taken):
+    """Its motion has the same fact as where each call is followed."""
+    routine = "PROC f()\nMoveL Offs(p,1,0,0),v1,z1,tool0;\nENDPROC\n"
+    found = _propagation("f;\n" * 1000, routine)
+    [fact] = found.facts.values()
+    assert unknown_in(fact.target) is None
+    assert len(taken) < 1000 + 2 * 12
+    apart = _propagation("f;\nWaitTime 0;\n" * 1000, routine)
+    assert len(taken) > 3000
+    assert next(iter(apart.facts.values())).target.items[0] == fact.target.items[0]
+
+
+@pytest.mark.parametrize("statement", ["f;", "unread;"])
+def test_a_repeated_call_is_passed_only_once_nothing_changes(statement):
+    """A routine that counts goes on counting, and what comes between two calls starts anew."""
+    routine = "PROC f()\nn:=n+1;\nENDPROC\n"
+    for times in (2, 3, 7, 64, 100):
+        found = _propagation(f"n:=0;\n{'f;' * times}{statement}\nMoveL Offs(p,n,0,0),v1,z1,tool0;\n", routine)
+        [fact] = found.facts.values()
+        number = unknown_in(fact.target)
+        if statement == "f;":
+            assert number is None
+            assert fact.target.items[0].items[0].value == times + 1
+
+
+def test_no_more_than_so_many_calls_are_followed_in_a_run(taken):
+    """Beyond it what a routine sets is not known; one that does not move leaves the robot where it is."""
+    routine = "PROC f()\nn:=n+1;\nENDPROC\n"
+    motion = "MoveL Offs(p,n,0,0),v1,z1,tool0;\n"
+    found = _propagation(f"{motion}n:=0;\n" + "f;\n" * (MOST_CALLS + 3000) + motion, routine)
+    first, last = found.facts.values()
+    assert unknown_in(last.target) is not None
+    assert last.before == frozenset([first.statement.start])
+    assert len(taken) < 3 * (2 * MOST_CALLS + 3000) + 100
+    assert b"F" in found.calls
 
 
 def test_loops_in_a_loop_of_unknown_length_are_run_few_times(monkeypatch):

@@ -13,6 +13,7 @@ from postproc.base.findings import Refusal
 from postproc.base.geometry import Poses
 from postproc.base.yaml_section import parsed
 from postproc.effects import EFFECTS, ChainState, Conditions, Offset
+from postproc.effects.effect import Parameter
 
 ARMS = {
     "kr270": lambda: kr270().joints,
@@ -35,6 +36,22 @@ def options(text):
 
 
 # Bounds and sizes
+
+
+def test_a_parameter_without_bounds_may_be_any_number():
+    free = Parameter("share", "1", 0.0)
+    assert (free.lower, free.upper) == (-math.inf, math.inf)
+    assert free.plausible == (0.0, math.inf)
+    assert not free.hardware
+
+
+@names
+def test_dimensions_of_hardware_are_those_of_a_drawing(name):
+    """They are taken from the robot file, and change nothing by themselves: all else of the effect is a fit's."""
+    effect = made(name, kr270().joints)
+    hardware = {one.name for one in effect.parameters if one.hardware}
+    assert hardware == ({"L", "a_x", "a_y", "h"} if name == "gravity_compensator" else set())
+    assert all(one.unit == "m" for one in effect.parameters if one.hardware)
 
 
 def has_one_sign(effect, parameter):

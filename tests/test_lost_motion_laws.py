@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from path_cases import task
+from path_cases import START, TOOL, task
 from test_lost_motion import GAP, axes_along, lagging, lossy
 
-from postproc.base.geometry import rotation_from_vector
+from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.compensation.lost_motion import dead_band
+from postproc.robot.axis_track import follow_axes
 from postproc.toolpath import Kind
 
 
@@ -90,3 +91,27 @@ def test_what_is_known_along_a_motion_is_known_of_its_places():
     np.testing.assert_array_equal(found[3::4], job.conditions_at(rows[3::4]).direction)
     corrected = job.conditions_at(rows, share, corrected=True).direction
     np.testing.assert_allclose(corrected, job.lost_motion.run(1.0).at(rows, share), atol=1e-12)
+
+
+@pytest.mark.parametrize("degrees", [0.2, 0.8, 7.0, 33.0])
+@pytest.mark.parametrize("size", [0.0, 0.4, 30.0, 180.0])
+def test_as_many_places_as_a_line_or_its_turn_asks_for(degrees, size):
+    """One every 25 mm or every 5 deg of an axis, two of what is longer than 2 mm or turns by more than half a degree;
+    of a turn in place as well."""
+    points = np.array([[1.5, -0.1, 0.55], [1.5, -0.1, 0.5], [1.5, -0.1 + size * 1e-3, 0.5]])
+    points = np.vstack([points, points[-1] + [0.0, 1e-4, 0.0]])
+    plain = task(points, (False, False, True, True), kind=[Kind.PTP] + [Kind.LIN] * 3, wrench=np.zeros(6))
+    rotation = plain.toolpath.rotation.copy()
+    rotation[2:] = rotation[2:] @ rotation_from_vector(np.array([[0.0, 0.0, np.radians(degrees)]]))[0]
+    wanted = Poses(rotation, plain.wanted.position)
+    path = replace(plain.toolpath, targets=replace(plain.toolpath.targets, rotation=rotation))
+    track = follow_axes(plain.model.robot, path, wanted @ TOOL.inverse(), START)
+    job = lossy(replace(plain, toolpath=path, wanted=wanted, track=track), axes=(1,))
+    turn = np.degrees(np.abs(np.diff(job.track.q, axis=0)).max(axis=1))
+    lost = job.lost_motion
+    for row, length in ((2, size), (3, 0.1)):
+        count = max(int(np.ceil(max(length / 25.0, turn[row - 1] / 5.0))), 1)
+        if length > 2.0 or turn[row - 1] > 0.5:
+            count = max(count, 2)
+        share = lost.share[(lost.row == row) & (lost.share > 0.0)]
+        assert np.isin(np.round(np.arange(1, count + 1) / count, 9), np.round(share, 9)).all()

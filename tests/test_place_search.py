@@ -43,6 +43,27 @@ def test_a_place_is_found_beside_a_bend_and_across_rows() -> None:
     assert (row[1], share[1]) == (0, 0.5)
 
 
+def test_a_place_beside_a_leap_is_not_asked_for_again() -> None:
+    """Where the force sets in at once, no place is nearest: the search went on 30 times where it stood."""
+    length, leap = np.array([10.0]) * MM, 4.0 * MM
+    row, share = np.array([0]), np.array([0.2])
+    asked = []
+
+    def gap(at: np.ndarray) -> np.ndarray:
+        return np.where(at < leap, 1.6, -0.3) * MM
+
+    def ahead(tools: np.ndarray) -> np.ndarray:
+        asked.append(share[0])
+        return gap(share[tools] * length[0])
+
+    beside = PlacesBeside(1)
+    beside.put(np.array([0]), row, share, gap(np.array([2.0 * MM])))
+    beside.put(np.array([0]), row, np.array([0.4]), gap(np.array([leap])))
+    beside.search(np.array([0]), length, row, share, ahead, 1e-9)
+    assert share[0] == pytest.approx(0.4, abs=1e-9)
+    assert len(asked) < 20
+
+
 @pytest.fixture(scope="module", params=["lead-in", "steps"])
 def fitted(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory):
     folder: Path = tmp_path_factory.mktemp("fitted")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from gcode_writing import round_trip
 from planes import DIALECT, HEAD, PLANES, differences, drawn, read
+from test_gcode_read import read as gcode_read
 
 
 @pytest.mark.sample(40)
@@ -133,3 +134,14 @@ def test_what_turns_coordinates_along_the_tool_stays_when_trans_replaces_a_frame
     code: str, back: str
 ) -> None:
     assert ends("sinumerik", f"{code}\nTRANS\nG1 X1 Y2 Z3\n{back}\nTRANS\nG1 X1 Y2 Z3\n") == ["?*", "1 2 3"]
+
+
+@pytest.mark.parametrize("plane", ["G68 X1. Y2. R30.", "G68.2 X1. Y2. Z3. I10. J20. K30."])
+def test_both_codes_end_a_plane(plane: str) -> None:
+    """G69 and G69.1 are one."""
+    text = "G21 G90 G17 G54 T1\nG0 X0. Y0. Z0.\n{}\nG0 X5.\n{}\nG1 X7. Y8. Z9. F600\n"
+    found = [
+        list(gcode_read(text.format(plane, end), "fanuc").toolpath.dump())[-1]
+        for end in ("G69", "G69.1", "G90")
+    ]
+    assert found[0] == found[1] != found[2]

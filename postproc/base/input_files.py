@@ -14,6 +14,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from types import MappingProxyType
 
+from postproc.base.batches import in_blocks
 from postproc.base.findings import Code, Finding, Refusal, define
 from postproc.base.system import FileSet
 
@@ -76,22 +77,9 @@ class Inputs:
 
     def refuse_changed(self) -> None:
         """Refusal FIL010 for every file that no longer holds what was read, FIL001 for those that are gone."""
-        findings = []
-        for path, digest in self.digests.items():
-            if path in _provided.get():
-                continue
-            try:
-                # by its bytes: its time may have been set back
-                same = path.is_file() and _digest_of(path) == digest
-                if not same:
-                    path.stat()
-            except OSError as error:
-                findings.append(
-                    Finding("FIL001", f"the file cannot be read any more: {error.strerror}", str(path))
-                )
-            else:
-                if not same:
-                    findings.append(_changed(path))
+        read = [(path, digest) for path, digest in self.digests.items() if path not in _provided.get()]
+        known = in_blocks(lambda part: _finding_of_change(*read[part.start]), len(read), 1)
+        findings = [finding for finding in known if finding is not None]
         if findings:
             raise Refusal(*findings)
 
@@ -146,6 +134,18 @@ def note(path: Path, raw: bytes) -> None:
     digest = hashlib.sha256(raw).hexdigest()
     if inputs.digests.setdefault(path, digest) != digest:
         raise Refusal(_changed(path))
+
+
+def _finding_of_change(path: Path, digest: str) -> Finding | None:
+    """What is reported where a file does not have this digest; None where it has."""
+    try:
+        # by its bytes: its time may have been set back
+        if path.is_file() and _digest_of(path) == digest:
+            return None
+        path.stat()
+    except OSError as error:
+        return Finding("FIL001", f"the file cannot be read any more: {error.strerror}", str(path))
+    return _changed(path)
 
 
 def _digest_of(path: Path) -> str:

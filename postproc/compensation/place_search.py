@@ -47,14 +47,21 @@ class PlacesBeside:
         low, high = begins[rows] + self._known[:, 1, tools] * length[rows]
         below, above = -self._known[:, 2, tools]
         brackets, active = Brackets(low, high, below, above), np.flatnonzero(low < high)
+        asked, gaps = np.full((2, len(tools)), np.nan), np.full(len(tools), np.nan)
         for _ in range(ROUNDS):
             if not len(active):
                 break
             at = brackets.secants(active)
             part = np.clip(np.searchsorted(begins, at, "right") - 1, 0, len(length) - 1)
-            row[tools[active]] = first + part
-            share[tools[active]] = np.clip((at - begins[part]) / np.maximum(length[part], settled), 0.0, 1.0)
-            gap = ahead(tools[active])
+            along = np.clip((at - begins[part]) / np.maximum(length[part], settled), 0.0, 1.0)
+            # beside a leap the ends come together, and what is to be asked for is the same place again
+            new = (np.stack((part, along)) != asked[:, active]).any(axis=0)
+            some = active[new]
+            if len(some):
+                asked[:, some] = part[new], along[new]
+                row[tools[some]], share[tools[some]] = first + part[new], along[new]
+                gaps[some] = ahead(tools[some])
+            gap = gaps[active]
             brackets.narrow(active, at, -gap)
             going: Bools = np.abs(gap) > settled
             active = active[going]

@@ -188,7 +188,7 @@ def _ramps(
     )
     exact = reach[:, 0] == 0
     arc = np.stack([desired_path.arc[row - 1], desired_path.arc[row]], axis=1)
-    feed = np.nan_to_num(np.maximum(path.feed[row], path.feed[row - 1]))
+    feed = np.nan_to_num(np.fmax(path.feed[row], path.feed[row - 1]))
     spacing = np.broadcast_to(np.maximum(limits.ramp_end, feed * limits.cycle)[:, None], arc.shape).copy()
     for side in (0, 1):
         some = np.flatnonzero(arc[:, side])

@@ -26,6 +26,7 @@ from postproc.compensation.place_search import PlacesBeside
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.run_sides import ON_LINE, ON_PARABOLA, SAME_PLACE, Stations, rounded_sides
 from postproc.compensation.subdivision import Subdivision, subdivided_motions
+from postproc.compensation.summits import summits
 
 ROUNDS, SETTLED = 6, 2e-8
 """Steps in which the place of the path that the tool is nearest to is looked for; [m] a smaller one is none."""
@@ -142,27 +143,27 @@ class RoundedOutput:
 
     def peaks(self, at: Ints, share: Floats, closer: int = CLOSER) -> tuple[Floats, Floats]:
         """(K,) [m] and (K,) [rad]: by how much the tool is off at most at the shares (K, S) of the segments ``at``
-        (K, S), in the order of the path, ``closer`` times nearer around the largest of them, and at the ``turns`` of
-        the force."""
+        (K, S), in the order of the path, ``closer`` times nearer around the largest of them and around others that may
+        be larger in between, and at the ``turns`` of the force."""
         many = len(share)
-        off, angle = np.zeros(many), np.zeros(many)
+        off, angle, owner = np.zeros(many), np.zeros(many), np.arange(many)
         gap = np.where(np.diff(at, axis=1) == 0, np.diff(share, axis=1), 0.0)
         edge = np.zeros((many, 1))
         width = np.maximum(np.hstack([edge, gap]), np.hstack([gap, edge]))
         for level in range(closer + 1):
             found = self.deviations(at.ravel(), share.ravel())
             here, turned = (lengths(part).reshape(at.shape) for part in (found.shift, found.turn))
-            off = np.maximum(off, here.max(axis=1))
-            angle = np.maximum(angle, turned.max(axis=1))
+            np.maximum.at(off, owner, here.max(axis=1))
+            np.maximum.at(angle, owner, turned.max(axis=1))
             if level == closer:
                 break
             if level == 0:
                 for which, _, _, there in self.where_force_turns(at, share, found):
                     np.maximum.at(off, which, lengths(there.shift))
                     np.maximum.at(angle, which, lengths(there.turn))
-            peak = here.argmax(axis=1)[:, None]
-            centre, width = np.take_along_axis(share, peak, 1), np.take_along_axis(width, peak, 1)
-            at = np.repeat(np.take_along_axis(at, peak, 1), len(AROUND), axis=1)
+            row, peak = summits(here) if level == 0 else (np.arange(len(here)), here.argmax(axis=1))
+            owner, at = owner[row], np.repeat(at[row, peak][:, None], len(AROUND), axis=1)
+            centre, width = share[row, peak][:, None], width[row, peak][:, None]
             share = np.clip(centre + width * AROUND, 0.0, 1.0)
             width = np.repeat(width * (AROUND[1] - AROUND[0]), len(AROUND), axis=1)
         return off, angle
@@ -372,15 +373,18 @@ def _moved(task: CompensationProblem, row: Ints, share: Floats, step: Floats) ->
     """The places (S,) that lie by ``step`` (S,) [m] farther along the program's path than row (S,), share (S,); no
     farther than the motions before and after them, of the same cut."""
     desired_path, path = task.desired_path, task.toolpath
-    length = np.maximum(desired_path.length, NEAREST)
-    share = share + step / length[row]
+
+    def length(rows: Ints) -> Floats:
+        return np.maximum(desired_path.length[rows], NEAREST)
+
+    share = share + step / length(row)
     for side in (1, -1):
         other = np.clip(row + side, 0, len(path) - 1)
         over = (share > 1.0) if side > 0 else (share < 0.0)
         later = other if side > 0 else row
         can = over & (other != row) & desired_path.traceable[other] & path.continues[later]
         can &= task.carries[other] & (path.tool[other] == path.tool[row])
-        beyond = ((share - 1.0) if side > 0 else -share) * length[row] / length[other]
+        beyond = ((share - 1.0) if side > 0 else -share) * length(row) / length(other)
         share = np.where(can, beyond if side > 0 else 1.0 - beyond, share)
         row = np.where(can, other, row)
     return row, np.clip(share, 0.0, 1.0)

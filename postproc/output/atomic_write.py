@@ -10,7 +10,9 @@ import re
 import secrets
 import time
 from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import BinaryIO
 
 from postproc.base import system
 from postproc.base.findings import Code, Finding, Refusal, define
@@ -35,6 +37,9 @@ Content = bytes | Iterable[bytes]
 
 LOCK = ".compensate.lock"
 """In a folder while one run writes into it."""
+
+SYNCED = 8
+"""Files at most that go to the disk at once."""
 
 PATIENCE = (0.05, 0.1, 0.2, 0.4, 0.8)
 """[s] Waits between attempts to rename a file that another program holds open, which Windows refuses: a virus scanner
@@ -79,7 +84,7 @@ def replace_file(path: Path, content: bytes, still: Callable[[], None] = lambda:
         with contextlib.ExitStack() as locks:
             if _lock_folders({path.parent}, locks):
                 _sweep([path])
-            _write(ready, content)
+            _sync(_write(ready, content))
             still()
             _rename(ready, path)
             _sync_folder(path.parent)
@@ -128,8 +133,12 @@ def _put_in_place(
             at.parent.mkdir(parents=True, exist_ok=True)
         if _lock_folders({path.parent for path in files}, locks):
             _sweep(files)
-        for at, content in files.items():
-            _write(ready[at], content)
+        with ThreadPoolExecutor(SYNCED, "sync") as pool:  # the disk takes them together in half of the time
+            synced = {}
+            for at, content in files.items():
+                synced[at] = pool.submit(_sync, _write(ready[at], content))
+            for at in synced:
+                synced[at].result()
         still()
         order = sorted(files, key=lambda path: path == last)
         for at in reversed(order):
@@ -224,10 +233,20 @@ def _sweep(files: Iterable[Path]) -> None:
                     os.unlink(entry.path)
 
 
-def _write(path: Path, content: Content) -> None:
-    with open(path, "xb") as stream:
+def _write(path: Path, content: Content) -> BinaryIO:
+    """A new file with its content, which may not be on the disk yet."""
+    stream = open(path, "xb")  # noqa: SIM115 (closed by _sync)
+    try:
         stream.writelines([content] if isinstance(content, bytes) else content)
         stream.flush()
+    except BaseException:
+        stream.close()
+        raise
+    return stream
+
+
+def _sync(stream: BinaryIO) -> None:
+    with stream:
         os.fsync(stream.fileno())
 
 

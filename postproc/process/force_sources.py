@@ -10,15 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from postproc.base.findings import Finding, Refusal
-from postproc.base.tables import read_table
 from postproc.cell import Cell, MotionFrames
 from postproc.process.force_comments import marked_air, read_annotations
-from postproc.process.force_logs import read_log
-from postproc.process.force_table import place_column, read_force_table
-from postproc.process.operations import process_forces
 from postproc.process.stated_forces import FORM, NotAForce, StatedForces, parse_force
-from postproc.process.stock.compiled import check_compiler
-from postproc.process.stock.stock_section import has_stock
+from postproc.process.stock.stated_stock import has_stock
 from postproc.process.wrenches import Wrenches, turn_to_robot_axes
 from postproc.toolpath import Toolpath
 
@@ -139,6 +134,10 @@ class _ForceRequest:
         return StatedForces(np.array([values]), np.array([frame]), all_of_one), (), spec
 
     def table(self, path: Path) -> SourcedForces:
+        from postproc.base.tables import read_table  # these are loaded where there is a table
+        from postproc.process.force_logs import read_log
+        from postproc.process.force_table import place_column, read_force_table
+
         table = read_table(path, "FRC003")
         column, program = place_column(table), str(self.program)
         if column == "line":
@@ -148,6 +147,9 @@ class _ForceRequest:
         return stated, findings, path.name
 
     def process(self, path: Path) -> SourcedForces:
+        from postproc.process.operations import process_forces  # these are loaded where there is a process
+        from postproc.process.stock.compiled import check_compiler
+
         self.no_offset("the force is computed from a process")
         if has_stock(path):
             check_compiler(str(path))

@@ -211,7 +211,7 @@ def turn_to_robot_axes(
     carries = stated.acts & ~is_air(toolpath)
     if not np.any(carries):
         return Wrenches.zero(len(toolpath), source, findings)
-    largest = max(np.abs(stated.values).max(), np.abs(stated.start_values).max())
+    largest = max(_largest_size(stated.values), _largest_size(stated.start_values))
     if largest > MOST:
         message = f"{source}: no robot carries a force of {largest:.3g} N (or N m)"
         raise Refusal(Finding("FRC002", message, file, help="state forces in N and moments in N m"))
@@ -292,6 +292,11 @@ def turn_to_robot_axes(
     if stated.profiles is None:
         return wrenches
     return replace(wrenches, ramps=_profile_ramps(stated.profiles, wrenches, turn, path_length))
+
+
+def _largest_size(values: Floats) -> float:
+    """The largest size among ``values`` (...)."""
+    return float(np.maximum(values.max(), -values.min()))
 
 
 def _profile_ramps(

@@ -93,8 +93,9 @@ class _DiffLines:
 
 def _blocks(old: _DiffLines, new: _DiffLines, edits: Edits) -> _Blocks:
     """All blocks; of those at the end of a text the line after its last ending is none."""
-    parts = [_touched(old, edits, low, high) for low, high in _apart(old.raw, edits)]
-    first, last, grown = np.concatenate(parts, axis=1)
+    ranges = list(_apart(old.raw, edits))
+    parts = in_blocks(lambda part: _touched(old, edits, *ranges[part.start]), len(ranges), 1)
+    first, last, grown = np.concatenate(list(parts), axis=1)
     start = (first + sums(grown)[:-1]).astype(np.int32)
     stop = np.minimum(start + last - first + 1 + grown, new.count)
     return _Blocks(first, np.minimum(last, old.count - 1), start, stop - start)

@@ -14,7 +14,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 import jinja2
@@ -26,7 +26,6 @@ from postproc.base.findings import CODES, Finding
 from postproc.base.system import relative_path
 from postproc.compensation.correct import MotionOutcome
 from postproc.compensation.problem import CompensationProblem
-from postproc.part.part_figures import PartError
 from postproc.report.compiled_templates import CompiledTemplates
 from postproc.report.page_data import PageData
 from postproc.report.page_words import (
@@ -38,8 +37,10 @@ from postproc.report.page_words import (
     program_verdict,
     reasons,
 )
-from postproc.report.part_page import oblique_yaw, part_data, part_section
 from postproc.toolpath import Kind
+
+if TYPE_CHECKING:
+    from postproc.part.part_figures import PartError
 
 FOLDER = Path(__file__).parent / "html"
 
@@ -66,6 +67,7 @@ def program_page(
     report = data.report
     shown = None
     if part is not None and task is not None:
+        from postproc.report.part_page import oblique_yaw, part_data, part_section
         from postproc.report.part_scene import part_scene  # numba: only where there is a stock
 
         scene = part_scene(task, data.rows)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import struct
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from postproc.base.arrays import Floats
 from postproc.base.units import MM
-from postproc.part.part_figures import PartError
+
+if TYPE_CHECKING:
+    from postproc.part.part_figures import PartError
 
 BANDS = np.array(
     [

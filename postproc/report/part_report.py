@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from postproc.base.units import MM
 from postproc.compensation.uncertainty import Uncertainty
-from postproc.part.part_figures import CutForces, ErrorFigures, PartFigures, SideFigures, SurfaceGroup
 from postproc.report.formatting import known_mm, two_digits
+
+if TYPE_CHECKING:
+    from postproc.part.part_figures import CutForces, ErrorFigures, PartFigures, SideFigures, SurfaceGroup
 
 SIDES = {"before": "part before", "after": "part after"}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -14,11 +14,13 @@ from postproc.base.findings import SEVERITIES, Finding
 from postproc.base.units import MM
 from postproc.compensation.path_comparison import Transitions
 from postproc.compensation.uncertainty import Uncertainty
-from postproc.part.part_figures import PartFigures
 from postproc.report.formatting import known, known_mm
 from postproc.report.part_report import part_json
 from postproc.report.result import Columns, Result
 from postproc.report.result_keys import complete_result
+
+if TYPE_CHECKING:
+    from postproc.part.part_figures import PartFigures
 
 WITHIN, UNCERTAIN, REVIEW, NOT_CORRECTED = "within_tolerance", "uncertain", "needs_review", "not_corrected"
 VERDICTS = (WITHIN, UNCERTAIN, REVIEW, NOT_CORRECTED)

@@ -278,7 +278,7 @@ def _settle(
     reset = given | stated
     reset |= toolpath.paths_meet[np.maximum(rows, 0)]  # several motions may precede it
     reset[0] = True
-    last = np.maximum.accumulate(np.where(reset, order, 0))
+    starts, since = np.flatnonzero(reset), np.cumsum(reset) - 1
     large = _large(robot, values, rows, reset, branch, toolpath, base, tool)
 
     def turned(axis: int, step: Floats) -> tuple[Floats, Floats]:
@@ -287,13 +287,14 @@ def _settle(
         by = wrapped(np.diff(value))
         by[large.place - 1] = step
         smooth = np.concatenate([[value[0]], value[0] + np.cumsum(by)])
+        own = value[starts]
         signed = np.where(
-            (turn >> axis) & 1 == 1,
-            np.where(value > SIGN_MARGIN, value - 2 * np.pi, value),
-            np.where(value < -SIGN_MARGIN, value + 2 * np.pi, value),
+            (turn[starts] >> axis) & 1 == 1,
+            np.where(own > SIGN_MARGIN, own - 2 * np.pi, own),
+            np.where(own < -SIGN_MARGIN, own + 2 * np.pi, own),
         )
-        wish = np.where(given | ~stated, value, signed)
-        return smooth, (wish - smooth)[last]
+        wish = np.where((given | ~stated)[starts], own, signed)
+        return smooth, (wish - smooth[starts])[since]
 
     other = np.zeros(len(large.place), np.bool_)
     either = np.flatnonzero(large.either)
@@ -301,7 +302,7 @@ def _settle(
         axes = [sum(turned(axis, large.step[:, k])) for k, axis in enumerate(TURNING)]
         low, high = robot.limits[[axis - 6 for axis in TURNING]].T
         choices = TurnChoices(large.place[either], large.more[either])
-        other[either] = choose_senses(np.stack(axes, axis=1), np.flatnonzero(reset), choices, low, high)
+        other[either] = choose_senses(np.stack(axes, axis=1), starts, choices, low, high)
     step = large.step + np.where(other[:, None], large.more, 0.0)
     for k, axis in enumerate(TURNING):
         smooth, beside = turned(axis, step[:, k])

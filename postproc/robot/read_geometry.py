@@ -28,7 +28,6 @@ from postproc.robot.geometries import (
     standard_dh,
     turn_about,
 )
-from postproc.robot.urdf import read_urdf
 
 KINDS = ("kuka", "dh", "mdh", "urdf")
 MAX_TURN = 1000 * DEG
@@ -65,6 +64,8 @@ def read_geometry(
     read: list[Path] = []
     tip = Poses.identity()
     if kind == "urdf":
+        from postproc.robot.urdf import read_urdf  # XML: only where there is a URDF
+
         given = section.section("urdf")
         given.only("file", "base", "tip")
         path = beside(given)

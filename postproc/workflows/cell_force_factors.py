@@ -9,7 +9,7 @@ from postproc.process import Wrenches
 from postproc.process.force_factors import ForceFactors
 from postproc.process.operation_names import OperationNames, name_operations
 from postproc.process.process_file import read_process
-from postproc.process.stock.stock_section import has_stock
+from postproc.process.stock.stated_stock import has_stock
 from postproc.toolpath import Toolpath
 
 

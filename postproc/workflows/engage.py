@@ -14,7 +14,7 @@ from postproc.cell import frames_of
 from postproc.output.atomic_write import write_atomically
 from postproc.process.stock.compiled import check_compiler
 from postproc.process.stock.cutters import CUTTING, HOLDER, SHANK
-from postproc.process.stock.stock_section import has_stock
+from postproc.process.stock.stated_stock import has_stock
 from postproc.report.engaged import Engaged, engaged_csv, engaged_table
 from postproc.report.report import exit_code, in_order_of_place, json_bytes
 from postproc.robot.description import find_robot, load_robot

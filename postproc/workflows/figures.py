@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.subdivision import Subdivision, subdivided_motions
 from postproc.compensation.uncertainty import evaluate_uncertainty
 from postproc.output.write import WrittenProgram
-from postproc.part.part_figures import PartFigures
 from postproc.report.report import (
     PathFigures,
     Report,
@@ -26,6 +26,9 @@ from postproc.report.report import (
     exit_code,
 )
 from postproc.workflows.preparation import Prepared, Request
+
+if TYPE_CHECKING:
+    from postproc.part.part_figures import PartFigures
 
 WORST_PLACES = 5
 

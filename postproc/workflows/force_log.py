@@ -13,7 +13,7 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import lengths
 from postproc.cell import frames_of
 from postproc.process import wrenches
-from postproc.process.stock.stock_section import has_stock
+from postproc.process.stock.stated_stock import has_stock
 from postproc.toolpath import Kind
 from postproc.workflows.preparation import Prepared
 

@@ -1,12 +1,10 @@
-"""What kind of file was given in the place of measurements, or of the controller's data."""
+"""What kind of file was given in the place of measurements."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from postproc.base.document import Document
 from postproc.base.findings import Finding, Refusal
-from postproc.base.read_files import read_text_file
 from postproc.languages import DIALECTS
 from postproc.measurements import codes as codes
 
@@ -44,12 +42,3 @@ def check_kind(path: Path, wanted: tuple[str, str] = READINGS) -> None:
                 help=wanted[1],
             )
         )
-
-
-def read_controller_data(path: Path) -> Document:
-    """The controller's $config.dat.  Raises Refusal FIL009 for a file that is no data list."""
-    document = Document(path, read_text_file(path))
-    if b"DEFDAT" not in document.raw.upper():
-        help = "name the controller's $config.dat: its first statement is DEFDAT $CONFIG"
-        raise Refusal(Finding("FIL009", "this file is no data list of a controller", str(path), help=help))
-    return document

@@ -11,7 +11,8 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.units import MM
 from postproc.learning import codes as codes
 from postproc.process.stock.cutters import Cutter
-from postproc.process.stock.stock_section import has_stock, read_stock_process
+from postproc.process.stock.stated_stock import has_stock
+from postproc.process.stock.stock_section import read_stock_process
 from postproc.process.stock.tool_comments import CommentedTool, read_tool_comments
 from postproc.workflows.preparation import Prepared
 

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from postproc.base.arrays import Ints
 from postproc.base.findings import Finding
 from postproc.base.units import MM
 from postproc.compensation.subdivision import Subdivision
-from postproc.part.part_figures import PartError
+from postproc.part import codes as codes
 from postproc.workflows.force_log import logged_force_findings
 from postproc.workflows.preparation import Prepared
+
+if TYPE_CHECKING:
+    from postproc.part.part_figures import PartError
 
 _MOST_LINES = 12
 

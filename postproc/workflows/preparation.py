@@ -42,7 +42,7 @@ from postproc.toolpath import Toolpath
 from postproc.workflows.cell_force_factors import factored
 from postproc.workflows.cell_tool_errors import cell_tool_displacement
 from postproc.workflows.correction_mode import corrected_model, mode_findings, temperature_rise, touch_off
-from postproc.workflows.kinds import read_controller_data
+from postproc.workflows.data_list import read_controller_data
 from postproc.workflows.ramp_lengths import early_shares, ramp_lengths
 from postproc.workflows.reading_findings import configuration_findings, reader_findings, start_findings
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -36,7 +37,6 @@ from postproc.output.write import (
     write,
     writing_settings,
 )
-from postproc.part.part_figures import PartFigures
 from postproc.report.corrections_csv import correction_table, corrections_csv
 from postproc.report.diff import unified_diff
 from postproc.report.page import beside, program_page
@@ -56,6 +56,9 @@ from postproc.workflows.preparation import (
     silent,
 )
 from postproc.workflows.ramp_lengths import nearest_point
+
+if TYPE_CHECKING:
+    from postproc.part.part_figures import PartFigures
 
 LEAST = 200
 """Motions that may be inserted into any program where the cell does not limit its growth: a controller holds them."""
@@ -211,9 +214,8 @@ def _compensate(request: Request, stage: Stage) -> Report:
     }
     if part is not None:
         files |= {path: part_mesh(part, end) for path, end in meshes.items()}
-    ready.inputs.refuse_changed()
     release_free_memory()
-    write_atomically(files, target, ready.inputs.refuse_changed)  # writing takes its time as well
+    write_atomically(files, target, ready.inputs.refuse_changed)
     return report
 
 

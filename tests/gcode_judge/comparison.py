@@ -156,7 +156,7 @@ def _check(row: Row, motion: Motion) -> list[tuple[str, str]]:
         wrong.append(("base", f"work offset {row.base}, rs274 has {motion.base}"))
     if np.isfinite(row.offset).all() and row.base != 0:
         turned = (row.turn - motion.rotation + 180.0) % 360.0 - 180.0
-        if np.abs(row.offset - motion.offset).max() > 2 * motion.step or abs(turned) > 1e-3:
+        if np.abs(row.offset - motion.offset).max() > 2 * motion.offset_step or abs(turned) > 1e-3:
             wrong.append(("offset", f"{_shown(row.offset)}, rs274 has {_shown(motion.offset)}"))
     elif row.base >= 0 and motion.rewritten:
         wrong.append(("offset", "the work offset is not that of the cell: the program changes it"))

@@ -36,6 +36,8 @@ MISREADINGS = {
     "o1 while [#20 lt 2]\n#21=0\no2 while [#21 lt 3]\n#21=[#21+1]\n#7=[#7+1]\nG0 X#7\no2 break\no2 endwhile\nM2",
     "an offset in a deleted block after another one": START
     + "G1 Y8\n/G58\nG1 X9 Y2 Z2\n/G57\nX2\nG54\nX3 Y3 Z3\nM2",
+    "an offset that is written and selected in inches": "G10 L2 P7 X24 Y25.36 Z-19.43\nG20\nG59.1\nG21\n"
+    "G1 X20.437 Y75 Z-28.203 F100\nX9\nM2",
     "the centre of an arc in a mode that is not known": START + "/G90.1\nG1 X10 Y10\nG3 I-10 J-10\nM2",
 }
 

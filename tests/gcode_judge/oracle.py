@@ -35,8 +35,9 @@ class Motion:
     line: from 1.  kind: "PTP", "LIN" or "CIRC".  start, end (3,) [mm]: in the coordinates of the work offset in
     force, with the shift of G92 in them, as the program's reader has them.  step, start_step [mm]: of the last
     digits printed. base: number of the work offset; rewritten: the program has changed it.  tool: in the spindle,
-    -1 before any change to a tool of a T word.  offset (3,) [mm], rotation [deg]: the work offset in force.  Of
-    arcs: centre (3,) [mm]; turn [rad], counter-clockwise about the plane's third axis."""
+    -1 before any change to a tool of a T word.  offset (3,) [mm], rotation [deg]: the work offset in force;
+    offset_step [mm]: of its last digits.  Of arcs: centre (3,) [mm]; turn [rad], counter-clockwise about the plane's
+    third axis."""
 
     line: int
     kind: str
@@ -52,6 +53,7 @@ class Motion:
     plane: tuple[int, int, int] = (0, 1, 2)
     offset: np.ndarray = field(default_factory=lambda: np.zeros(3))
     rotation: float = 0.0
+    offset_step: float = 1e-4
 
     @property
     def still(self) -> bool:
@@ -115,7 +117,7 @@ class _Account:
         self.axes = _AXES["XY"]
         self.shift, self.shift_unit = np.zeros(3), 1.0
         self.offset, self.length, self.rotation = np.zeros(3), np.zeros(3), 0.0
-        self.here, self.step = np.zeros(3), 1e-4
+        self.here, self.step, self.offset_step = np.zeros(3), 1e-4, 1e-4
         self.base, self.tool, self.selected = 1, -1, False
         self.offsets: dict[int, np.ndarray] = {}
         self.rewritten: set[int] = set()
@@ -160,7 +162,7 @@ class _Account:
             words = arguments.split(",")
             self.base = int(words[0])
             values = np.array([float(word) for word in words[1:4]]) * self.unit
-            self.offset = values
+            self.offset, self.offset_step = values, 1e-4 * self.unit
             if np.abs(self.offsets.setdefault(self.base, values) - values).max() > 0.01:
                 self.rewritten.add(self.base)
         elif name == "SET_XY_ROTATION":
@@ -177,7 +179,7 @@ class _Account:
         # Both the place and the shift are printed with four decimals.
         step = 1e-4 * (self.unit + self.shift_unit * self.shift.any())
         changed = self.base in self.rewritten or self.rotation != 0.0
-        arc |= {"offset": self.offset, "rotation": self.rotation}
+        arc |= {"offset": self.offset, "rotation": self.rotation, "offset_step": self.offset_step}
         self.motions.append(
             Motion(line, kind, self.here, end, step, self.step, self.base, changed, self.tool, **arc)  # type: ignore[arg-type]
         )

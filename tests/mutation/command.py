@@ -179,9 +179,15 @@ def main(words: list[str] | None = None) -> int:
     totals, chosen = drawn(tree, rooms, asked.sample, asked.seed, folder / "drawn.json")
     tests = tests_of(tree, asked.tests, asked.without)
     if asked.near:
-        tests = [
-            test for test in tests if stream.is_near(tree, test, [top for r in rooms for top in ROOMS[r]])
+        near = [
+            test
+            for test in tests_of(tree, [], [])
+            if stream.is_near(tree, test, [top for r in rooms for top in ROOMS[r]])
         ]
+        # a word that leaves out files elsewhere may stand in the name of one that tests the room
+        left_out = ", ".join(Path(test).stem for test in near if test not in tests)
+        print(f"left out though they import the rooms: {left_out or 'none'}")
+        tests = [test for test in near if test in tests]
     pairs = [(one.mutant, one.text) for one in chosen]
     log = folder / "stream.jsonl"
     seen = stream.run(tree, pairs, tests, log, asked.seconds, tier)

@@ -48,6 +48,11 @@ def warm(tier: str = ALL) -> None:
     """Imports what every judgement needs and no mutant touches."""
     for name in HEAVY:
         __import__(name)
+    register_profile(tier)
+
+
+def register_profile(tier: str) -> None:
+    """How hypothesis draws: alike for every mutant."""
     # what fails is not made smaller, and nothing hangs on the speed of this machine
     phases = [hypothesis.Phase.explicit, hypothesis.Phase.generate]
     hypothesis.settings.register_profile(
@@ -132,6 +137,7 @@ def _child(tree: Path, seconds: dict[str, float], note: Path, words: Path, tier:
         stay(tree)
         os.environ["PYTHONDONTWRITEBYTECODE"] = "1"  # a mutant leaves no byte code behind
         sys.dont_write_bytecode = True
+        register_profile(tier)
         files = list(dict.fromkeys(name.split("::")[0] for name in seconds))
         options = ["-x", *OPTIONS, "--hypothesis-profile", PROFILE, "-m", tier]
         code = int(pytest.main([*files, *options], plugins=[_Chosen(seconds, note)]))

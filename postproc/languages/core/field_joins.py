@@ -44,7 +44,9 @@ class FieldJoins:
         """The fields that are no longer those of ``one`` where ``other`` comes in, and their values."""
         values, others = self.values(one), self.values(other)
         changed: dict[str, Any] = {}
-        differing = map(is_not, values, others)
+        differing = tuple(map(is_not, values, others))
+        if True not in differing:
+            return changed
         for name, join, a, b in compress(
             zip(self._names, self._joins, values, others, strict=True), differing
         ):

@@ -137,24 +137,33 @@ def _merged(
     place = base, id(own), id(other)
     if known is not None and place in known:
         return known[place][2]
-    merged, is_own, is_other = list(own), True, True
+    changed: list[tuple[int, Any]] = []
+    is_other = True
     for at in compress(_PLACES, map(is_not, own, other)):
         one, two = own[at], other[at]
         if depth:
             mine, others = one or _EMPTY, two or _EMPTY
             new = _merged(mine, others, depth - 1, (base + at) * WIDTH, keys, merge, known)
-            is_own, is_other = is_own and new is mine, is_other and new is others
+            is_other = is_other and new is others
             new = one if new is mine else new
         else:
             new = merge(keys[base + at], one, two)
-            is_own, is_other = is_own and new is one, is_other and new is two
-        merged[at] = new
-    found = own if is_own else other if is_other else tuple(merged)
+            is_other = is_other and new is two
+        if new is not one:
+            changed.append((at, new))
+    found = own if not changed else other if is_other else _with(own, changed)
     if known is not None:
         if len(known) >= MOST_MERGES:
             known.clear()
         known[place] = own, other, found
     return found
+
+
+def _with(node: tuple[Any, ...], changed: list[tuple[int, Any]]) -> tuple[Any, ...]:
+    items = list(node)
+    for at, item in changed:
+        items[at] = item
+    return tuple(items)
 
 
 def _common(own: tuple[Any, ...], other: tuple[Any, ...], depth: int) -> tuple[Any, ...]:

@@ -14,7 +14,7 @@ from postproc.languages.krl.lexing import NAME, SPLINES, Statement, cached, iden
 from postproc.languages.krl.modal_state import ModalState
 from postproc.languages.krl.open_blocks import BUDGET, OpenBlocks
 from postproc.languages.krl.program_blocks import Block
-from postproc.languages.krl.statement_effects import COMMENTS, EVERYTHING, MODAL, Effect
+from postproc.languages.krl.statement_effects import EVERYTHING_AND_COMMENTS, MODAL, Effect
 from postproc.languages.krl.target import UnknownValue
 
 AFTER_FOR = UnknownValue("KRL002", "the value of a counter after its FOR is not documented")
@@ -300,7 +300,7 @@ class BlockFlow(OpenBlocks):
         if frame.block.has_labels:
             self.reachable = True
             self.run.forget(
-                EVERYTHING | COMMENTS, f"after line {frame.block.line}, whose block is not understood"
+                EVERYTHING_AND_COMMENTS, f"after line {frame.block.line}, whose block is not understood"
             )
             self.run.state.form = None
         self.run.state.sources = together(sources | self.run.state.sources)

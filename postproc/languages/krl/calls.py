@@ -21,8 +21,7 @@ from postproc.languages.krl.other_modules import RoutineExit, take_exit
 from postproc.languages.krl.program_blocks import Routine
 from postproc.languages.krl.program_structure import MOST_EFFECTS, callers, closure
 from postproc.languages.krl.statement_effects import (
-    COMMENTS,
-    EVERYTHING,
+    EVERYTHING_AND_COMMENTS,
     PATH_FROM_FILE,
     SYSTEM,
     Effect,
@@ -83,7 +82,7 @@ class Calls(BlockFlow):
         """After a label to which jumps lead that are not followed."""
         run, meeting = self.run, self.run.rows.label(*key)
         self.reachable = True
-        run.forget(EVERYTHING | COMMENTS, f"after the label {shown(name)} in line {item.line}")
+        run.forget(EVERYTHING_AND_COMMENTS, f"after the label {shown(name)} in line {item.line}")
         meeting.sources |= run.state.sources
         run.state.sources = frozenset([meeting])
         run.state.form = None

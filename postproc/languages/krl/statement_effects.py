@@ -65,6 +65,8 @@ EVERYTHING: Effects = {"point", "record", "override", "all", *MODAL}
 COMMENTS: frozenset[Effect] = frozenset(["force", "switch"])
 """What comments change that speak to this tool."""
 
+EVERYTHING_AND_COMMENTS: Effects = EVERYTHING | COMMENTS
+
 _FUNCTION = re.compile(rb"(?<![A-Za-z0-9_$#.'])(" + NAME + rb")[ \t]*\(")
 _WORDS = frozenset(
     b"AND OR NOT EXOR B_AND B_OR B_NOT B_EXOR IF THEN WHILE UNTIL FOR TO STEP SWITCH CASE WAIT SEC RETURN".split()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -80,27 +81,12 @@ class Evaluator:
 
     def typed(self, expression: Expression) -> Typed:
         """The value of an expression, and its type."""
-        match expression:
-            case NumberLiteral():
-                return Leaf(expression.value, expression.start, expression.stop), b"NUM"
-            case StringLiteral():
-                return Leaf(expression.value), b"STRING"
-            case Name():
-                if expression.name in (b"TRUE", b"FALSE"):
-                    return (TRUE if expression.name == b"TRUE" else FALSE), b"BOOL"
-                return self.look(expression.name)
-            case Aggregate():
-                return GroupValue(tuple(self.value(item) for item in expression.items)), b""
-            case Component():
-                return self._component(expression)
-            case Index():
-                return self._element(expression)
-            case OperatorExpression():
-                return self._operation(expression), b""
-            case FunctionCall():
-                return self._call(expression)
-            case Star():
-                return UnknownData("its target is stored outside of the text (*)"), b""
+        return _TYPED[type(expression)](self, expression)
+
+    def _name(self, expression: Name) -> Typed:
+        if expression.name in (b"TRUE", b"FALSE"):
+            return (TRUE if expression.name == b"TRUE" else FALSE), b"BOOL"
+        return self.look(expression.name)
 
     def assigned_place(self, target: Expression) -> tuple[bytes | None, tuple[int, ...]]:
         """The variable to which an assignment goes, and the indices of the part that it sets, -1 where not known."""
@@ -349,6 +335,20 @@ def _of_numbers(operator: bytes, one: float, other: float) -> Value:
     if operator in (b"DIV", b"MOD") and other > 0 and one >= 0 and one == int(one) and other == int(other):
         return Leaf(float(one // other if operator == b"DIV" else one % other))
     return UnknownData("it is computed")
+
+
+_TYPED: dict[type[Expression], Callable[[Evaluator, Any], Typed]] = {
+    NumberLiteral: lambda self, one: (Leaf(one.value, one.start, one.stop), b"NUM"),
+    StringLiteral: lambda self, one: (Leaf(one.value), b"STRING"),
+    Name: Evaluator._name,
+    Aggregate: lambda self, one: (GroupValue(tuple(map(self.value, one.items))), b""),
+    Component: Evaluator._component,
+    Index: Evaluator._element,
+    OperatorExpression: lambda self, one: (self._operation(one), b""),
+    FunctionCall: Evaluator._call,
+    Star: lambda self, one: (UnknownData("its target is stored outside of the text (*)"), b""),
+}
+"""What gives the value and the type of each form of an expression."""
 
 
 def _shown(name: bytes) -> str:

@@ -99,7 +99,7 @@ def _why_unread(name: bytes, flow: Propagation) -> str:
     if flow.usage.is_late(name):
         return "names the procedure by a text: it may move the robot"
     if name in flow.routines:
-        return "calls itself, is called too deep, or is not understood: not each of its runs is followed"
+        return "calls itself, is called too deep or too often, or is not understood: not each of its runs is followed"
     return "is not in this file: it may move the robot"
 
 

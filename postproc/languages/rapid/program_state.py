@@ -47,8 +47,8 @@ class ProgramState:
 
     def take(self, other: ProgramState) -> None:
         """Becomes the other one."""
-        for one in fields(self):
-            setattr(self, one.name, getattr(other, one.name))
+        for name in _NAMES:
+            setattr(self, name, getattr(other, name))
 
     def put(self, name: bytes, value: Value) -> None:
         self.values = self.values.set(name, value)
@@ -88,6 +88,7 @@ class ProgramState:
         return True
 
 
+_NAMES = tuple(one.name for one in fields(ProgramState))
 _JOINS = FieldJoins(
     {
         "displaced": frozenset.union,

@@ -6,7 +6,6 @@ them.  A motion has one fact, which holds in all of its executions.
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Set
 from dataclasses import replace
 
@@ -31,11 +30,13 @@ from postproc.languages.rapid.instructions import (
     MotionForm,
     is_motion,
 )
-from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read, override_of, waits_at
+from postproc.languages.rapid.motion_facts import motion_fact, not_read, waits_at
+from postproc.languages.rapid.motion_modes import MODES_OF_MOTIONS, set_mode
 from postproc.languages.rapid.program_state import ProgramState
 from postproc.languages.rapid.routine_entries import program_entries, run_again, run_aside, value_at_start
 from postproc.languages.rapid.routine_graph import RapidStep, RoutineGraph
 from postproc.languages.rapid.routine_names import RoutineNames
+from postproc.languages.rapid.run_record import RunRecord
 from postproc.languages.rapid.step_budget import StepBudget
 from postproc.languages.rapid.syntax_tree import (
     Argument,
@@ -50,7 +51,7 @@ from postproc.languages.rapid.syntax_tree import (
     Remark,
 )
 from postproc.languages.rapid.values import UnknownData, Value, plain, replaced, truth_of
-from postproc.toolpath import ArcFrame, Kind, OrientationMode
+from postproc.toolpath import Kind
 
 OTHER = MotionForm(Kind.OTHER)
 _SETTINGS = frozenset([b"TOOLDATA", b"WOBJDATA", b"SPEEDDATA", b"ZONEDATA"])
@@ -59,13 +60,13 @@ MOST_RUNS = 8
 """Runs of main after each other until all of them start with the same."""
 DEEPEST = 12
 """Calls in each other."""
+UNSETTLED = ProgramState()
+"""In the place of what is left at the end of a run: it is still to come."""
 
 
 class Propagation:
-    """Runs a module.  ``facts``: offset of a motion -> its fact, in the order in which they run first; ``passed``:
-    comments in that order with the number of motions before each; ``calls``: name of what is not in the file -> offset
-    of its first call; ``reads``: where the place of the robot is read -> the motions after which; ``unread``:
-    statements that are not understood; ``preceding``: the comment in force before each, VARYING where several may."""
+    """Runs a module.  ``facts``, ``passed``, ``calls``, ``reads``: as of a RunRecord; ``unread``: statements that are
+    not understood; ``preceding``: the comment in force before each, VARYING where several may."""
 
     def __init__(self, module: Module, raw: bytes) -> None:
         self.module = module
@@ -78,10 +79,9 @@ class Propagation:
         functions = frozenset(r.name for r in module.routines if r.kind == b"FUNC")
         self.data = DeclaredData(module, functions, raw)
         self.usage = Usage(module)
-        self.facts: dict[int, MotionFact] = {}
-        self.passed: dict[int, tuple[Remark, int]] = {}
-        self.calls: dict[bytes, int] = {}
-        self.reads: defaultdict[int, set[Source]] = defaultdict(set)
+        self._record = RunRecord()
+        self.facts, self.passed = self._record.facts, self._record.passed
+        self.calls, self.reads = self._record.calls, self._record.reads
         self.unread: dict[int, NotUnderstood] = {}
         self._strayed = frozenset([ELSEWHERE] if self.usage.strays else [])
         self._again: set[bytes] = set()  # routines of which not each run is followed
@@ -94,9 +94,7 @@ class Propagation:
         bodies = (body for routine in module.routines for body in (routine.body, routine.handlers))
         self._restarts = any(b"EXITCYCLE" in leaving_words(body) for body in bodies)
         self._numbers = KeyNumbers()
-        self._meetings: defaultdict[int, Meeting] = defaultdict(Meeting)
         self.preceding: dict[int, Remark | Varying | None] = {}
-        self.rows = 0
         self.waited: set[Source] = set()
         self._budget = StepBudget(module)
         self._runner = FlowRunner(self.after_block, lambda: len(self._names.aliased))
@@ -133,23 +131,26 @@ class Propagation:
             mode_changes(one.body for one in self.module.routines).lose(state, b"its caller")
         if self._aside:
             state.displaced |= {b"a trap or an error handler"}
-        if is_main:
-            self._start_again(routine, state)
-        self._start()
-        end = self._routine(routine, state, True)
+        if not is_main or (end := self._start_again(routine, state)) is UNSETTLED:
+            self._start()
+            end = self._routine(routine, state, True)
         if end is not None:
             self._leave_place(end)
 
-    def _start_again(self, main: RapidRoutine, state: ProgramState) -> None:
-        """Takes in what the last run of main left, with which it starts again."""
+    def _start_again(self, main: RapidRoutine, state: ProgramState) -> ProgramState | None:
+        """Takes in what the last run of main left, with which it starts again.  What is left at the end where the last
+        run started so, and is taken up; UNSETTLED where ``state`` is still to be run."""
         changes = mode_changes(routine.body for routine in self.module.routines)
         if not (any(state.values.items()) or changes.names):
-            return
-        for _ in range(0 if self._restarts else MOST_RUNS):
+            return UNSETTLED
+        for number in range(0 if self._restarts else MOST_RUNS):
             self._start()
-            after = self._routine(main, state.copy(), False)
+            self._record.clear()
+            aliases = len(self._names.aliased)
+            after = end = self._routine(main, state.copy(), number > 0)
             again = state.copy()
             if after is not None:
+                end = after.copy()
                 if main.handlers:  # an error may end it in the middle
                     self._lose_effects(main.name, after)
                 after.forget_own(main.name)
@@ -157,10 +158,12 @@ class Propagation:
             again.last, again.waits = state.last, state.waits
             again.force, again.switch = state.force, state.switch
             if again.is_same(state):
-                return
+                return end if number and len(self._names.aliased) == aliases else UNSETTLED
             state.take(again)
+        self._record.clear()
         self._forget_all(self.usage.assigned, state)
         changes._replace(speaks=False).lose(state, b"an earlier run")
+        return UNSETTLED
 
     def _start(self) -> None:
         """Starts a run of the program."""
@@ -198,8 +201,7 @@ class Propagation:
     ) -> list[tuple[int, ProgramState]]:
         """Where a block leads, and what holds there."""
         block = graph.blocks[at]
-        for step in block.steps:
-            self._step(step, state)
+        self._steps(block.steps, state)
         if block.condition is None:
             return [(block.follow, state)]
         self._functions(block.condition, state)
@@ -207,6 +209,23 @@ class Propagation:
         if holds is None:
             return [(block.follow, state), (block.otherwise, state)]
         return [(block.follow if holds else block.otherwise, state)]
+
+    def _steps(self, steps: list[RapidStep], state: ProgramState) -> None:
+        """Runs statements.  A call that is there again and again is passed once it changes nothing: what it does then
+        is what it did before."""
+        called, count, settled = b"", 0, False
+        for step in steps:
+            name = step.name if type(step) is Instruction and not step.arguments else b""
+            if not name or name != called or is_motion(name):
+                called, count, settled = name, 1, False
+                self._step(step, state)
+            elif settled:
+                self._budget.take(step)
+            else:
+                count += 1
+                before = None if count & (count - 1) else state.copy()
+                self._step(step, state)
+                settled = before is not None and state.is_same(before)
 
     def _step(self, step: RapidStep, state: ProgramState) -> None:
         self._budget.take(step)
@@ -248,7 +267,7 @@ class Propagation:
 
     def _remark(self, step: Remark, state: ProgramState) -> None:
         if self._runner.recording:
-            self.passed.setdefault(step.start, (step, self.rows))
+            self.passed.setdefault(step.start, (step, self._record.rows))
         if place := place_of(step.text):
             if self.preceding.setdefault(step.start, before := getattr(state, place)) != before:
                 self.preceding[step.start] = VARYING
@@ -264,7 +283,9 @@ class Propagation:
             self._call(routine, step, state)
         elif name in MOTIONS:
             if self._runner.recording:
-                self._record(step.start, motion_fact(step, MOTIONS[name], state, self._evaluator(state)))
+                self._record.motion(
+                    step.start, motion_fact(step, MOTIONS[name], state, self._evaluator(state))
+                )
             self._moved(step, step.start, state)
             if MOTIONS[name].calls and self.usage.synchronous_call(step) not in self.routines:
                 self.calls.setdefault(step.name, step.start)
@@ -289,25 +310,11 @@ class Propagation:
                 self._note_reading(step.start, state)
         elif name in RESTORING:
             state.displaced -= frozenset(RESTORING[name])
-        elif name in (b"CONFL", b"CONFJ"):
-            given = options & {b"ON", b"OFF"}
-            checks = b"ON" in given if len(given) == len(step.arguments) == 1 else None
-            setattr(state, "checks_linear" if name == b"CONFL" else "checks_joint", checks)
-        elif name == b"SINGAREA":
-            modes = {frozenset([b"OFF"]): OrientationMode.VAR, frozenset([b"WRIST"]): OrientationMode.JOINT}
-            state.orientation = modes.get(frozenset(options), OrientationMode.UNKNOWN)
-        elif name == b"CIRPATHMODE":
-            arcs = {frozenset([b"PATHFRAME"]): ArcFrame.PATH, frozenset([b"OBJECTFRAME"]): ArcFrame.BASE}
-            state.arc = arcs.get(frozenset(options), ArcFrame.UNKNOWN)
-        elif name == b"SPEEDREFRESH":
-            state.override = None
-        elif name == b"VELSET":
-            state.override = override_of(step.arguments, self._evaluator(state))
+        elif name in MODES_OF_MOTIONS:
+            set_mode(step, state, self._evaluator(state))
         elif name in WRITERS:
             self._change(step.arguments, state)
-        elif name in (b"ACTUNIT", b"DEACTUNIT"):
-            pass
-        elif name not in HARMLESS:
+        elif name not in HARMLESS and name not in (b"ACTUNIT", b"DEACTUNIT"):
             self._unread_call(step, state, moves=True)
         elif name.startswith(b"WAIT"):
             self._change(tuple(a for a in step.arguments if a.name), state)
@@ -315,14 +322,14 @@ class Propagation:
     def _not_read(self, step: Instruction, state: ProgramState, message: str) -> None:
         """A motion of which only its place is known."""
         if self._runner.recording:
-            self._record(step.start, not_read(step, OTHER, state, message))
+            self._record.motion(step.start, not_read(step, OTHER, state, message))
         self._moved(step, step.start, state)
 
     def _plain(self, step: PlainMotions, state: ProgramState) -> None:
         """Motions that are run one after the other."""
         if self._runner.recording:
             fact = motion_fact(step.first, MOTIONS[step.first.name], state, self._evaluator(state))
-            self._record(step.start, replace(fact, lines=step))
+            self._record.motion(step.start, replace(fact, lines=step))
         self._moved(step.first, step.last, state)
 
     def _moved(self, motion: Instruction, at: int, state: ProgramState) -> None:
@@ -330,12 +337,6 @@ class Propagation:
         state.last = frozenset([at]) | self._strayed
         state.waits = Waits.NO
         state.concurrent = any(argument.name == b"CONC" for argument in motion.arguments)
-
-    def _record(self, at: int, fact: MotionFact) -> None:
-        """Takes up the fact of the motion at an offset."""
-        known = self.facts.get(at)
-        self.facts[at] = fact if known is None else known.joined(fact, self._meetings[at])
-        self.rows += fact.count if known is None else 0
 
     def _unread_call(self, step: Instruction, state: ProgramState, moves: bool) -> None:
         if self._runner.recording:
@@ -358,10 +359,12 @@ class Propagation:
 
     def _call(self, routine: RapidRoutine, step: Instruction, state: ProgramState) -> None:
         """Runs a routine of the file with its arguments."""
-        deep = len(self._names.active) >= DEEPEST or not self._budget.has_calls
-        if deep or routine in self._names.active or self.is_unclear(routine):
-            self._again |= self._effects.of(routine.name).routines
-            self._unread_call(step, state, moves=True)
+        deep = len(self._names.active) >= DEEPEST
+        unclear = deep or routine in self._names.active or self.is_unclear(routine)
+        if unclear or not self._budget.take_call():
+            reach = self._effects.of(routine.name)
+            self._again |= reach.routines
+            self._unread_call(step, state, moves=unclear or not reach.routines.isdisjoint(self.usage.moves))
             self._lose_effects(routine.name, state)
             return
         resumes = leaving_words(self._names.active[-1].handlers)

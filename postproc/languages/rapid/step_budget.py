@@ -12,6 +12,10 @@ MOST_IN_RUN = 10_000
 more: what routines do that call others several times each grows with a power of their number."""
 
 
+MOST_CALLS = 10_000
+"""Calls that are followed in a run of the program."""
+
+
 class TooLong(Exception):
     """The flow is too long to follow."""
 
@@ -24,15 +28,17 @@ class StepBudget:
         self._left = MOST_STEPS + 4 * statements
         self._in_run = MOST_IN_RUN + 8 * statements
         self._last_called = 0  # at as many that are left calls are not followed any more
+        self._calls = MOST_CALLS
 
     def start_run(self) -> None:
         """Starts a run of the program."""
         self._last_called = self._left - self._in_run
+        self._calls = MOST_CALLS
 
-    @property
-    def has_calls(self) -> bool:
-        """Whether calls are still followed in this run."""
-        return self._left >= self._last_called
+    def take_call(self) -> bool:
+        """Whether a call is still followed in this run."""
+        self._calls -= 1
+        return self._calls >= 0 and self._left >= self._last_called
 
     def take(self, statement: object) -> None:
         """Follows a statement.  Raises TooLong."""

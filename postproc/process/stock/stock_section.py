@@ -56,11 +56,6 @@ class StockProcess:
     rapid: float
 
 
-def has_stock(path: Path) -> bool:
-    """Whether a process file states a stock.  Refusal: FIL..., YML..."""
-    return "stock" in load(path)
-
-
 def read_stock_process(path: Path, commented: Mapping[int, CommentedTool] | None = None) -> StockProcess:
     """A process file with a stock: lengths in mm, angles in deg.  Refusal: FIL..., YML... with file, line and key.
 

@@ -1,0 +1,31 @@
+"""Instructions that change how motions after them are meant."""
+
+from __future__ import annotations
+
+from postproc.languages.rapid.evaluation import Evaluator
+from postproc.languages.rapid.motion_facts import override_of
+from postproc.languages.rapid.program_state import ProgramState
+from postproc.languages.rapid.syntax_tree import Instruction
+from postproc.toolpath import ArcFrame, OrientationMode
+
+MODES_OF_MOTIONS = frozenset([b"CONFL", b"CONFJ", b"SINGAREA", b"CIRPATHMODE", b"SPEEDREFRESH", b"VELSET"])
+
+
+def set_mode(step: Instruction, state: ProgramState, evaluator: Evaluator) -> None:
+    """Takes up an instruction of ``MODES_OF_MOTIONS``."""
+    options = frozenset(argument.name for argument in step.arguments)
+    match step.name:
+        case b"CONFL" | b"CONFJ":
+            given = options & {b"ON", b"OFF"}
+            checks = b"ON" in given if len(given) == len(step.arguments) == 1 else None
+            setattr(state, "checks_linear" if step.name == b"CONFL" else "checks_joint", checks)
+        case b"SINGAREA":
+            modes = {frozenset([b"OFF"]): OrientationMode.VAR, frozenset([b"WRIST"]): OrientationMode.JOINT}
+            state.orientation = modes.get(options, OrientationMode.UNKNOWN)
+        case b"CIRPATHMODE":
+            arcs = {frozenset([b"PATHFRAME"]): ArcFrame.PATH, frozenset([b"OBJECTFRAME"]): ArcFrame.BASE}
+            state.arc = arcs.get(options, ArcFrame.UNKNOWN)
+        case b"SPEEDREFRESH":
+            state.override = None
+        case b"VELSET":
+            state.override = override_of(step.arguments, evaluator)
