@@ -82,7 +82,6 @@ def test_a_wrong_mesh_writes_nothing(folder, data, code):
         (STOCK + tool().replace("  1:", "  7:"), "STK006"),
         (STOCK + tool(teeth=0), "YML004"),
         (STOCK + tool(spindle=0), "YML004"),
-        (STOCK + tool(spindle=200), "COR002"),  # chips of 3 mm bend the arm by 158 mm
         (STOCK + tool(diameter=-16), "YML004"),
         (STOCK + tool(diameter=0.016), "YML004"),
         (STOCK + tool(holder="{diameter: 63, from: 20}"), "YML004"),
@@ -119,3 +118,95 @@ def test_another_speed_of_the_program_is_reported(folder):
     state(folder, STOCK + tool())
     _, findings, _ = job(folder)
     assert "STK021" in [one["code"] for one in findings]
+
+
+def test_what_no_robot_can_correct_names_the_spindle_that_it_follows_from(folder):
+    """200 1/min with F 3600 and 3 teeth: 6 mm per tooth bend the arm by more than may be corrected."""
+    state(folder, STOCK + tool(spindle=200))
+    exit, findings, written = job(folder)
+    assert (exit, written) == (1, [])
+    assert findings[0]["code"] == "COR002"
+    (chip,) = [one for one in findings if one["code"] == "STK024"]
+    assert (
+        "6 mm here (spindle 200 1/min as the process file states, F 3600 mm/min, 3 teeth)" in chip["message"]
+    )
+    assert "a cutter of 16 mm needs at least 750 1/min for this feed: compare the spindle" in chip["help"]
+
+
+ROWS = [(-10, 110, y) for y in (10, 20, 30, 40)]
+
+
+def rows_of(levels, rows=ROWS):
+    """A program of rows in X at levels: each starts and ends 2 mm beside a blank from 0 to 100."""
+    text = "G21 G90 G17 G54\nT1 M6\n"
+    for z in levels:
+        for first, last, y in rows:
+            text += f"G0 X{first} Y{y} Z30\nG0 Z{z}\nG1 X{last} F3600\nG0 Z30\n"
+    return text + "M2\n"
+
+
+def engaged(folder, text, process):
+    """Findings of the engagement by code."""
+    (folder / "part.ngc").write_text(text)
+    state(folder, process)
+    result = CliRunner().invoke(main, ["engage", str(folder / "part.ngc"), "--json", "-"])
+    found = {}
+    for one in json.loads(result.stdout)["findings"]:
+        found.setdefault(one["code"], []).append(one)
+    return result.exit_code, found
+
+
+def box(x=0, y=0, z=0, length=100):
+    return f"stock: {{box: [[{x}, {y}, -30], [{x + length}, {y + 60}, {z}]]}}\n"
+
+
+@pytest.mark.parametrize("shift", [50, -50])
+def test_a_blank_beside_its_place_is_reported(folder, shift):
+    code, found = engaged(folder, rows_of([-5]), box(x=shift) + tool())
+    assert code == 3
+    (one,) = found["STK032"]
+    side = "low" if shift > 0 else "high"
+    assert (
+        f"4 passes of tool 1 (lines 5 to 17) reach up to 60 mm beyond the {side} side of the blank in X"
+        in one["message"]
+    )
+    assert "end inside of it at the other side, at least 40 mm before it" in one["message"]
+    assert "compare the corners of the blank in X" in one["help"]
+    assert one["line"] == 1
+
+
+@pytest.mark.parametrize(
+    ("process", "rows"),
+    [
+        (box(), ROWS),
+        (box(x=10), ROWS),  # an overrun of less than two diameters is nobody's mistake
+        (box(length=400), ROWS),  # one end of a bar
+        (box(), [(-100, 200, y) for y in (10, 20, 30)]),  # long at both ends
+        (box(), [(-60, 60, 10), (-60, 60, 20), (-60, 60, 30), (-10, 110, 40)]),  # one goes through
+        (box(), [(-60, 60, 10), (-60, 60, 20)]),
+    ],
+)
+def test_a_blank_in_its_place_is_not(folder, process, rows):
+    _, found = engaged(folder, rows_of([-5], rows), process + tool())
+    assert "STK032" not in found
+
+
+@pytest.mark.parametrize(
+    ("levels", "top", "reported"),
+    [
+        ((-2, -4, -6, -8), 0, False),
+        ((-2, -4, -6, -8), 2, True),
+        ((-2, -4, -6, -7), 2, True),  # the last is what remains
+        ((-2, -4, -6, -8), -1, False),
+        ((-2, -4, -6, -8), 0.4, False),
+        ((-5, -5.5, -6), 0, False),  # a floor that is finished in two steps
+        ((-6, -8, -9, -9.5), 0, False),  # no equal steps
+    ],
+)
+def test_a_first_level_that_is_deeper_than_the_next_ones_is_reported(folder, levels, top, reported):
+    code, found = engaged(folder, rows_of(levels), box(z=top) + tool())
+    assert ("STK033" in found) == reported
+    if reported:
+        assert code == 3
+        (one,) = found["STK033"]
+        assert "cuts 4 mm deep in its first level (line 5), and goes 2 mm deeper in each" in one["message"]

@@ -21,8 +21,9 @@ from postproc.base.memory import release_free_memory
 from postproc.base.paged_memory import large_arrays_in_files
 from postproc.compensation.axis_limits import check_limits
 from postproc.compensation.corner_fit import corners_not_improved, fit_corners
-from postproc.compensation.correct import MotionOutcome, as_air, correct
+from postproc.compensation.correct import CorrectionResult, MotionOutcome, as_air, correct
 from postproc.compensation.path_comparison import cuts_not_improved
+from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.ramp_points import LeastPoints
 from postproc.compensation.subdivide import subdivide
 from postproc.compensation.subdivision import Limits
@@ -73,7 +74,7 @@ def _predict(request: Request, stage: Stage) -> Report:
     ready = prepare(request)
     refuse_without_force(request, ready)
     stage("predicting")
-    result = correct(replace(ready.task, gain=0.0))
+    result = _correct(ready, replace(ready.task, gain=0.0))
     part, of_part = part_error_of(ready, None)
     findings = in_order_of_place([*ready.findings, *result.findings, *of_part])
     report = report_of(request, ready, result, findings, part=None if part is None else part.figures)
@@ -278,7 +279,7 @@ def _corrected(
     )
     writing = writing_settings(cell, request.shared_points)
     while True:
-        result = correct(task)
+        result = _correct(ready, task)
         if task.gain == 0.0:  # as asked: nothing moves, nothing is inserted
             result = replace(
                 result, state=np.where(result.corrected, MotionOutcome.OFF, result.state).astype(np.int8)
@@ -303,6 +304,15 @@ def _corrected(
         if not unwritten:
             raise ValueError("motions that are not corrected are refused again")
         task = replace(task, toolpath=task.toolpath.with_refused({**known, **unwritten}))
+
+
+def _correct(ready: Prepared, task: CompensationProblem) -> CorrectionResult:
+    """``correct``.  A Refusal also has the warnings about the forces: what is beyond any robot follows from them."""
+    try:
+        return correct(task)
+    except Refusal as refusal:
+        warnings = [one for one in ready.wrenches.findings if one.severity == "warning"]
+        raise Refusal(*refusal.findings, *warnings) from refusal
 
 
 def _target(request: Request) -> Path:

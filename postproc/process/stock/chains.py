@@ -9,9 +9,12 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.geometry import lengths
 from postproc.base.units import DEG
-from postproc.process.stock.contact import RATE
+from postproc.process.stock.contact import FORCE, RATE
 from postproc.process.stock.distance import ANGLE, AXIS, CUTTER, STEP, TIP_POINT
 from postproc.process.stock.motion_sweeps import MotionSweeps
+
+_TREND = 0.2
+"""Where the removed area changes by more than this share over two spacings, every motion is looked at."""
 
 _JOINED, _SAME_WAY = 1e-9, 2 * DEG  # m, and of feed and spindle from one motion to the next
 
@@ -22,9 +25,9 @@ def chain_contacts(
 ) -> Floats:  # fmt: skip
     """The contacts (K, C) in the middles of the sweeps ``chosen`` (K,), none longer than its ``spacing`` (M,) [m].
 
-    Within a chain they are looked at a spacing apart.  Those between two that cut are interpolated where the removed
-    areas differ by at most the share ``even``, there and beside; all others are looked at too.  laws (M, 9): as of
-    ``find_contact``; look: contacts of sweeps.
+    Within a chain they are looked at a spacing apart.  Those between two are interpolated where both cut and are within
+    the share ``even`` of the line through those beside them, in removed area and force; all others are looked at too.
+    laws (M, 9): as of ``find_contact``; look: contacts of sweeps.
     """
     if not len(chosen):
         return look(chosen)
@@ -43,16 +46,8 @@ def chain_contacts(
     after = np.minimum(place + 1, len(seen) - 1)
     known = np.zeros(len(chosen), bool)
     known[seen] = True
-    rate = contacts[:, RATE]
-    # a gap between two that are alike may still hold a dip: those beside it have to be alike too
-    alike = np.zeros(len(seen) + 1, bool)
-    alike[1:-1] = ~first_of_chain[seen[1:]]
-    alike[1:-1] &= (np.minimum(rate[1:], rate[:-1]) > 0) & (
-        np.abs(np.diff(rate)) <= even * np.maximum(rate[1:], rate[:-1])
-    )
-    flat = np.zeros(len(seen) + 1, bool)
-    flat[1:-1] = alike[1:-1] & alike[:-2] & alike[2:]
-    between = ~known & flat[place + 1]
+    steady = _steady(along[seen], contacts, first_of_chain[seen], even)
+    between = ~known & steady[place] & steady[after]
     found = np.empty((len(chosen), contacts.shape[1]))
     found[seen] = contacts
     at = np.flatnonzero(between)
@@ -62,6 +57,28 @@ def chain_contacts(
     rest = np.flatnonzero(~known & ~between)
     found[rest] = look(chosen[rest])
     return found
+
+
+def _steady(along: Floats, contacts: Floats, first: Bools, even: float) -> Bools:
+    """(K,) whether contacts (K, C) at the places ``along`` (K,) [m] of their chains, of which those start ones that are
+    ``first``, lie on lines: a bend within which a line is ``even`` off at its middle node is a quarter of it off in
+    between.  A step, and a dip that begins, are on no line."""
+    steady = np.zeros(len(along), bool)
+    if len(along) < 3:
+        return steady
+    inner = ~(first[1:-1] | first[2:])
+    share = (along[1:-1] - along[:-2]) / np.where(inner, along[2:] - along[:-2], 1.0)
+    rate, force = contacts[:, RATE], contacts[:, FORCE : FORCE + 3]
+    most = np.maximum(np.maximum(rate[:-2], rate[1:-1]), rate[2:])
+    least = np.minimum(np.minimum(rate[:-2], rate[1:-1]), rate[2:])
+    off = np.abs((1 - share) * rate[:-2] + share * rate[2:] - rate[1:-1])
+    line = (1 - share)[:, None] * force[:-2] + share[:, None] * force[2:]
+    # of a tool without teeth or material no force is known
+    bent = np.nan_to_num(lengths(line - force[1:-1]))
+    size = np.nan_to_num(lengths(force[1:-1]))
+    alike = (least > 0) & (most - least <= _TREND * most)
+    steady[1:-1] = inner & alike & (off <= even * most) & (bent <= even * size)
+    return steady
 
 
 def _joins(sweeps: MotionSweeps, laws: Floats, chosen: Ints) -> Bools:

@@ -256,5 +256,24 @@ CODES = define(
             " blank, or run the program in parts, each with its own blank.",
             example="Ten million motions on a computer with 8 GB.",
         ),
+        "STK032": Code(
+            "warning",
+            "passes reach beyond one side of the blank only",
+            meaning="Parallel passes reach more than two diameters beyond one side of the blank at a feed, and end"
+            " inside of it at the other.",
+            consequence="The blank is probably stated beside its place: the program cuts air, and forces that are not"
+            " there are corrected.",
+            action="Compare the corners of the blank with the base and the zero point of the program.",
+            example="`box: [[50, 0, -30], [170, 80, 0]]` for a blank from X 0 to 120.",
+        ),
+        "STK033": Code(
+            "warning",
+            "first level is deeper than the next ones",
+            meaning="A tool goes down in equal steps, and its first level cuts far deeper than one of them.",
+            consequence="The top of the blank is probably stated too high, and the force of the first level is too"
+            " large.",
+            action="Compare the top of the blank with the zero point of the program.",
+            example="`box: [[0, 0, -30], [120, 80, 2]]` for a top at Z 0, and levels at Z -2, -4, -6.",
+        ),
     }
 )

@@ -51,6 +51,9 @@ _LEAST_ARC = 0.02 * np.pi / 180
 _SMALL_ARC, _SMALLER_ARC, _STRAIGHT_ENOUGH = 12.0 * np.pi / 180, 1.0 * np.pi / 180, 0.02
 _GRAZING = 0.01
 _LEAST_SHARE = 2e-4  # of the radius: the shortest length of profile
+_LEAST_GAP = (
+    4e-3  # of the radius: between two circles without stock so near none is in between that a force shows
+)
 _EVEN, _EVEN_AT_END = 2e-3, 3e-4  # change of a panel's integrals that ends its halving, as a share of all
 _BENT = 0.2
 _SKEW = 0.5 * np.pi
@@ -355,7 +358,7 @@ def find_contact(stock: Stock, cutter: SweepCutter, pose: Floats, contact: Float
         first, last = height_range(element, live[0], live[1])
         if last <= first:
             continue
-        least = _LEAST_SHARE * max(element[4], element[2])
+        least, gap = _LEAST_SHARE * max(element[4], element[2]), _LEAST_GAP * max(element[4], element[2])
         parts = int(min(max(2.0, np.ceil((last - first) / (4.0 * stock.grid[1]))), _MOST_PARTS))
         rough[:] = 0.0
         for part in range(parts + 1):
@@ -382,7 +385,7 @@ def find_contact(stock: Stock, cutter: SweepCutter, pose: Floats, contact: Float
                 if not done:
                     _set_node(stock, cutter, e, 0.5 * (left[_AT] + right[_AT]), pose, contact, middle)
                     if empty and middle[_TOUCHES] == 0.0:
-                        done = (
+                        done = wide < gap or (
                             abs(left[_SEEN]) < NEAR_ZERO
                             and abs(middle[_SEEN]) < NEAR_ZERO
                             and abs(right[_SEEN]) < NEAR_ZERO

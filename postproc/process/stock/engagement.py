@@ -44,8 +44,8 @@ SPACING = 0.5
 FINER, UNEVEN = 6, 0.05
 """How many times closer they are on a sweep along which the removed area changes by more than this share."""
 
-ALIKE = 0.02
-"""Short motions are interpolated between places whose removed areas differ by at most this share."""
+ALIKE = 0.01
+"""Short motions are interpolated between places whose removed areas and forces are on a line up to this share."""
 
 _STEP, _HALVINGS = 0.2, 8
 """Of two places of such a sweep one removes less than this share of the other: where it steps is halved so often."""

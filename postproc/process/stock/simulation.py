@@ -15,10 +15,12 @@ from postproc.cell import MotionFrames
 from postproc.process.force_profiles import ForceProfiles
 from postproc.process.stated_forces import BASE, FEED, StatedForces
 from postproc.process.stock.blank import Blank, box_blank, corners_of, cylinder_blank, mesh_blank
+from postproc.process.stock.chip_loads import implausible_chips
 from postproc.process.stock.contradictions import contradictions
 from postproc.process.stock.cutters import CUTTING, HOLDER, SHANK
 from postproc.process.stock.distance import AXIS, CUTTER, REMOVES, STEP, TIP_POINT, TURN
 from postproc.process.stock.engagement import EngagedMotions, engage, laws_of
+from postproc.process.stock.misplaced_blank import misplaced_blank
 from postproc.process.stock.motion_sweeps import MotionSweeps, find_sweeps
 from postproc.process.stock.saved_stock import Removed, read_stock, stock_bytes
 from postproc.process.stock.stl import read_stl
@@ -30,12 +32,6 @@ _PARTS = {CUTTING: "the cutter", SHANK: "the shank", HOLDER: "the holder"}
 _MOST_FINDINGS = 20
 _NO_MOVE = 1e-7  # m
 _SAME_SPEED = 0.001
-_LEAST_CHIP, _LARGEST_CHIP = 0.0005 * MM, 0.1
-"""[m] and of the diameter: feeds per tooth beyond have another unit than it seems."""
-_RUBS, _RUBS_OF = 0.0025 * MM, 0.0004
-"""[m] and of the diameter: a tool whose feed per tooth never exceeds the lesser cuts nothing, it rubs."""
-_DEEP, _DEEP_CHIP, _METAL = 0.15, 0.04, 300e6
-"""Of the diameter, depth and feed per tooth that no cutter has in a metal, whose Ktc [Pa] is above."""
 _SMALL = 10 * MM  # a blank that is no longer, or one of 10 m in metres
 
 
@@ -84,13 +80,12 @@ def simulate(path: Path, toolpath: Toolpath, frames: MotionFrames, program: str)
         *_not_simulated(sweeps, toolpath, program),
         *_lengths(sweeps, process),
         *_commented(sweeps, commented, frames.diameters, str(process.path), toolpath, program),
-        *_implausible_chips(
-            sweeps, laws_of(sweeps, toolpath, edges)[:, 0], engagement, process, toolpath, program
-        ),
+        *implausible_chips(sweeps, engagement, process, toolpath, program),
         *_speeds(sweeps, engagement.cuts, process, toolpath, program),
         *contradictions(
             process, sweeps, engagement, toolpath, frames.diameters, _tips(toolpath, frames), program
         ),
+        *misplaced_blank(process, sweeps, engagement, toolpath),
     ]
     return StockRun(process, toolpath, blank, before, sweeps, engagement, ci95, tuple(findings))
 
@@ -343,35 +338,6 @@ def _commented(
                 f" diameter {2 * cutter.radius / MM:g} mm, which is used"
             )
             findings.append(Finding("STK019", message, program, tool.line))
-    return findings
-
-
-def _implausible_chips(
-    sweeps: MotionSweeps,
-    chip: Floats,
-    cut: EngagedMotions,
-    process: StockProcess,
-    toolpath: Toolpath,
-    program: str,
-) -> list[Finding]:
-    """One finding for each tool; chip (M,) [m]: feed per tooth of the sweeps."""
-    findings = []
-    for index, cutter in enumerate(sweeps.cutters):
-        wide, material = 2 * cutter.radius, process.edges[cutter.number].material
-        own = (sweeps.which == index) & cut.cuts[sweeps.motion]
-        wrong = own & ((chip < _LEAST_CHIP) | (chip > _LARGEST_CHIP * wide))
-        if np.nanmax(chip[own], initial=0.0) < min(_RUBS, _RUBS_OF * wide):
-            wrong |= own & np.isfinite(chip)
-        if material is not None and material.coefficients.cutting[0] > _METAL:
-            wrong |= own & (chip > _DEEP_CHIP * wide) & (cut.depth[sweeps.motion] > _DEEP * wide)
-        if not wrong.any():
-            continue
-        at = int(np.argmax(wrong))
-        message = (
-            f"tool {cutter.number} has a feed per tooth of {chip[at] / MM:.3g} mm here, and in"
-            f" {len(np.unique(sweeps.motion[wrong]))} motions that cut an implausible one"
-        )
-        findings.append(Finding("STK024", message, program, int(toolpath.line[sweeps.motion[at]])))
     return findings
 
 
