@@ -10,7 +10,7 @@ import pytest
 
 from postproc.effects import EFFECTS as KINDS
 from postproc.identification.identifiable import identifiability
-from postproc.identification.unknowns import Unknown
+from postproc.identification.unknowns import Unknown, with_gauge
 from postproc.robot.description import Value, find_robot, load_robot
 
 SAMPLE = Path(__file__).parent.parent / "samples" / "kr270_campaign" / "loads.csv"
@@ -129,3 +129,20 @@ def test_a_stated_value_close_to_its_null_does_not_make_a_good_interval_too_weak
     nothing = np.zeros((1, 0))
     found = identifiability([unknown], column, nothing, [], np.zeros((1, 1)), np.array([1e-6]))
     assert (found.observable, found.dropped) == ((0,), ())
+
+
+@pytest.mark.parametrize(
+    ("deviation", "told"), [(1e-3, True), (1.6e-3, True), (1.7e-3, False), (4e-3, False)]
+)
+def test_geometry_that_tracker_and_targets_nearly_hide_stays_as_stated(deviation, told):
+    """A zero is plausible within 5 mrad: readings that by themselves say it to some 1.7 mrad choose a value by their
+    scatter, and what they were fitted to predicts other campaigns worse than what is stated."""
+    effect = KINDS["joint_offset"](load_robot(find_robot("kuka_kr270")).joints)
+    (unknown,) = with_gauge([Unknown("joint_offset.o6", 0, effect.parameters[5], 0.0)])
+    scale = unknown.parameter.scale
+    column = np.array([[30.0], [scale / deviation]])
+    nuisance = np.array([[1.0], [0.0]])
+    prior = np.array([[scale / unknown.prior]])
+    found = identifiability([unknown], column, nuisance, ["target"], prior, np.array([0.0]))
+    assert bool(found.observable) == told
+    assert [one.name for one in found.dropped] == [] if told else ["joint_offset.o6"]

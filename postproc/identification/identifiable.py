@@ -20,6 +20,10 @@ REDUNDANT = 1e-5
 FAR = 10.0
 """Usual sizes of a parameter."""
 
+HARDLY = 3.0
+"""What is plausible of geometry over what the readings leave uncertain of it, up to which it stays as it is stated: the
+zero of the last axis, say, beside targets that may lie anywhere on the tool."""
+
 PART = 1e-3
 """A smaller share of a dropped column is not worth naming."""
 
@@ -77,7 +81,7 @@ def identifiability(
             dropped.append(Dropped(unknown.name, "no reading depends on it"))
             continue
         own = float(np.linalg.norm(outside[: len(columns), k]))
-        if unknown.gauge and own < max(REDUNDANT * size, UNSEEN):
+        if unknown.gauge and own < max(REDUNDANT * size, UNSEEN, _hardly_told(unknown, min(factor, most))):
             dropped.append(_explained(k, unknowns, (), whole, nuisance, nuisance_names))
             continue
         rest = outside[:, k] - frame @ (frame.T @ outside[:, k])
@@ -109,6 +113,13 @@ def identifiability(
         )
         del observable[worst]
     return Identifiability((), tuple(dropped), np.zeros((0, 0)), np.nan)
+
+
+def _hardly_told(unknown: Unknown, factor: float) -> float:
+    """Length of an unknown's column, per scale and outside of the nuisances, up to which the readings tell of it little
+    beside what is plausible anyway, even if all else were known."""
+    assert unknown.prior is not None
+    return float(HARDLY * unknown.parameter.scale * np.sqrt(factor) / unknown.prior)
 
 
 def _limit(unknown: Unknown, value: float) -> float:
