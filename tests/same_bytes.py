@@ -56,16 +56,18 @@ def results(program: Path) -> str:
     """The digest of all files of a run, without the folders of program and package in them."""
     places = [str(place).encode() for place in (program.parent, Path(postproc.__file__).parents[1])]
     output, found = program.parent / "same", hashlib.sha256()
+    parts = []
     shutil.rmtree(output, ignore_errors=True)
     try:
         api.compensate(program, force=True, output=output / program.name)
     except Refusal as refusal:
-        found.update(str(refusal).encode())
+        parts.append(str(refusal).encode())
     for path in sorted(output.iterdir()) if output.exists() else ():
-        content = path.read_bytes()
+        parts += [path.name.encode() + b"\0", path.read_bytes()]
+    for part in parts:
         for place in places:
-            content = content.replace(place, b"")
-        found.update(path.name.encode() + b"\0" + content)
+            part = part.replace(place, b"")
+        found.update(part)
     return found.hexdigest()
 
 

@@ -85,6 +85,15 @@ def test_a_word_more_is_another_reading_or_a_finding(statement: str, word: str) 
         assert program.findings or not same, statement[:at] + word
 
 
+def test_off_in_a_branch_is_what_no_comment_is() -> None:
+    text = (CASES.folder / "bad" / "force_differs.mod").read_text()
+    cut = "IF DInput(d)=1 THEN\n! FORCE 0 9 0\ncut;\n! force  off\nENDIF\n"
+    found = read(text.replace("! FORCE 0 9 0\ncut;\n! FORCE OFF\n", cut).encode()).toolpath
+    assert [(note.row, note.text) for note in found.annotations] == [(0, "FORCE 0 9 0"), (1, "force  off")]
+    codes = {finding.code for finding in found.constraints.refused.values()}
+    assert "RAP006" in codes  # of the call under FORCE 0 9 0 and of the one without
+
+
 def test_zones_and_stops() -> None:
     path = read((CASES.folder / "zones.mod").read_bytes()).toolpath
     assert path.approximation / MM == pytest.approx([0, 0.3, 200, 3, 4, 0, 0, np.nan], nan_ok=True)

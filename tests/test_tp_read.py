@@ -157,6 +157,16 @@ def test_a_comment_in_force_below_another_one_is_repeated() -> None:
     assert notes == [(0, "FORCE 1 2 3"), (0, "FORCE 7 8 9"), (1, "FORCE OFF"), (2, "FORCE 7 8 9")]
 
 
+def test_off_in_a_branch_is_what_no_comment_is() -> None:
+    program = body(
+        "UFRAME_NUM=1", "UTOOL_NUM=1", "IF DI[1]=ON,JMP LBL[1]", "!FORCE 1 2 3", "L P[1] 50mm/sec FINE", "!FORCE OFF",
+        "LBL[1]", "L P[2] 50mm/sec FINE",
+    )  # fmt: skip
+    assert not program.toolpath.constraints.refused
+    notes = [(note.row, note.text) for note in program.toolpath.annotations]
+    assert notes == [(0, "FORCE 1 2 3"), (1, "FORCE OFF")]
+
+
 def test_the_place_of_a_motion_in_the_flow() -> None:
     path = read((CASES.folder / "jumps.ls").read_bytes()).toolpath
     assert path.continues.tolist() == [True, False, False, False]

@@ -39,25 +39,29 @@ class CommentInForce:
 
     @classmethod
     def of(cls, text: str, line: int) -> CommentInForce:
-        return cls(" ".join(text.upper().split()), text, line)
-
-    @property
-    def is_off(self) -> bool:
-        return self.statement == "FORCE OFF"
+        return cls(_statement(text), text, line)
 
 
 InForce = CommentInForce | Varying | None
 """A comment in force, None before the first one."""
 
 
-def join_comments(one: InForce, other: InForce) -> InForce:
+def _statement(text: str) -> str:
+    """What a comment states, in blanks and letters of one kind."""
+    return " ".join(text.upper().split())
+
+
+def is_off(comment: Comment | Varying | None) -> bool:
+    return comment is not None and comment is not VARYING and _statement(comment.text) == "FORCE OFF"
+
+
+def join_comments(one: Comment | Varying | None, other: Comment | Varying | None) -> Comment | Varying | None:
     """What is in force where two paths meet; before the first comment no force acts, as under FORCE OFF."""
-    if one == other:
-        return one
-    for first, second in ((one, other), (other, one)):
-        if first is None and isinstance(second, CommentInForce) and second.is_off:
-            return None
-    return VARYING
+    if one is None or other is None:
+        return None if one is other or is_off(one) or is_off(other) else VARYING
+    if one is VARYING or other is VARYING or _statement(one.text) != _statement(other.text):
+        return VARYING
+    return one
 
 
 def place_of(text: str) -> str:
@@ -81,5 +85,5 @@ class ShownComments:
     def others(self, force: object, switch: object) -> Iterator[tuple[str, object]]:
         """The words of which another comment, or none, is in force at the next row, and that comment."""
         for word, said in (("FORCE", force), ("COMPENSATE", switch)):
-            if said is not self._last[word]:
+            if said is not self._last[word] and not (said is None and is_off(self._last[word])):
                 yield word, said

@@ -9,6 +9,7 @@ from postproc.languages.core.comments_in_force import (
     VARYING,
     CommentInForce,
     InForce,
+    is_off,
     place_of,
 )
 from postproc.languages.krl.motion_rows import MotionRows, RowRefusal
@@ -38,11 +39,7 @@ def take_comments(rows: MotionRows) -> tuple[Annotation, ...]:
             elif isinstance(comment, CommentInForce) and comment != last[name]:
                 found.append(Annotation(row, comment.text, comment.line))
                 last[name] = comment
-            elif comment is None and last[name] is not None and not _is_off(last[name]):
+            elif comment is None and last[name] is not None and not is_off(last[name]):
                 message = f"no {_WORDS[name]} comment is in force, after motions with one"
                 rows.ranges.append((row, end, RowRefusal("KRL036", message, f"no {name}")))
     return (*found, *([] if following is None else [following]), *passed)
-
-
-def _is_off(comment: InForce) -> bool:
-    return isinstance(comment, CommentInForce) and comment.is_off

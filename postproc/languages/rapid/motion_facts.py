@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from postproc.languages.core.comments_in_force import CONTRADICTED, VARYING, Varying
+from postproc.languages.core.comments_in_force import CONTRADICTED, VARYING, Varying, join_comments
 from postproc.languages.core.field_joins import SOMETIMES, FieldJoins, either, lost
 from postproc.languages.core.motion_sources import Meeting, Source, met
 from postproc.languages.core.waits import Waits
@@ -112,8 +112,8 @@ _JOINS = FieldJoins(
         "stops": lost(False),
         "orientation": lost(OrientationMode.UNKNOWN),
         "arc": lost(ArcFrame.UNKNOWN),
-        "force": lost(VARYING),
-        "switch": lost(VARYING),
+        "force": join_comments,
+        "switch": join_comments,
         "problem": either,
         "checked": lost(None),
         "waits": SOMETIMES,

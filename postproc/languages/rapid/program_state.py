@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 
-from postproc.languages.core.comments_in_force import VARYING, Varying
+from postproc.languages.core.comments_in_force import Varying, join_comments
 from postproc.languages.core.field_joins import SOMETIMES, FieldJoins, either, lost
 from postproc.languages.core.motion_sources import START, Meeting, Source, met
 from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
@@ -95,8 +95,8 @@ _JOINS = FieldJoins(
         "override": lost(None),
         "orientation": lost(OrientationMode.UNKNOWN),
         "arc": lost(ArcFrame.UNKNOWN),
-        "force": lost(VARYING),
-        "switch": lost(VARYING),
+        "force": join_comments,
+        "switch": join_comments,
         "checks_linear": lost(None),
         "checks_joint": lost(None),
         "waits": SOMETIMES,

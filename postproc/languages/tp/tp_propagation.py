@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from postproc.languages.core.comments_in_force import VARYING, Varying, place_of
+from postproc.languages.core.comments_in_force import Varying, join_comments, place_of
 from postproc.languages.core.field_joins import FieldJoins, lost
 from postproc.languages.core.flow_runner import FlowRunner
 from postproc.languages.core.motion_sources import ELSEWHERE, START, Meeting, Source, met
@@ -102,8 +102,8 @@ _JOINS = FieldJoins(
         "registers": PersistentMap.common,
         "displaced": frozenset.union,
         "override": lost(None),
-        "force": lost(VARYING),
-        "switch": lost(VARYING),
+        "force": join_comments,
+        "switch": join_comments,
     }
 )
 
