@@ -25,7 +25,7 @@ from postproc.toolpath import Role
     [
         (np.pi / 2, TURNED, 0.5, 0.6, 2.0, False),
         (0.0, REVERSED, 2.0, 0.6, 4.0, True),
-        (0.0, MORE, 2.0, 1.0, 4.0, False),
+        (0.0, MORE, 2.0, 1.0, 3.5, True),
     ],
 )
 def test_of_ramps_that_no_points_hold_the_nearest_are_taken_where_they_are_clearly_nearer(

@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("numba")
 
 from postproc.base.geometry import Poses
-from postproc.report import page as page_module
+from postproc.report import part_page
 from postproc.report.page import FOLDER
 from postproc.report.part_page import part_data
 from postproc.report.part_scene import robot_chain
@@ -40,7 +40,7 @@ def made(tmp_path_factory, pytestconfig):
         return part_data(part, scene)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(page_module, "part_data", kept)
+        patch.setattr(part_page, "part_data", kept)
         report = compensate(Request(folder / SAMPLE / "part.ngc", force=""))
     return folder / SAMPLE / "compensated" / "part.report.html", report, parts[-1]
 

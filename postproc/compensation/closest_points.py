@@ -81,8 +81,9 @@ def closest_to_turn(
     vertex: int,
     turn: int,
 ) -> tuple[Floats, float]:
-    """As ``closest_points`` with a ``start``, beside the ``turn`` of the curve alone, and the largest distance there:
-    beside the others it may be ``FAR``."""
+    """As ``closest_points``, beside the ``turn`` of the curve alone: points (1, K, 3) [m] and their largest distance
+    [m] there; beside the other turns it may be ``FAR``.  start (1, K, 3) [m]: there the points start; parameter, reach
+    (1, K) and shortest (1, K - 1) [m] as there."""
     floor = np.full(curve.turn.shape[1], FAR)
     floor[turn] = enough
     best = _search(curve, start, parameter, reach, shortest, vertex, floor, enough + FAR * (len(floor) - 1))

@@ -10,7 +10,8 @@ import re
 import secrets
 import time
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import wait as wait_for
 from pathlib import Path
 from typing import BinaryIO
 
@@ -134,9 +135,16 @@ def _put_in_place(
         if _lock_folders({path.parent for path in files}, locks):
             _sweep(files)
         with ThreadPoolExecutor(SYNCED, "sync") as pool:  # the disk takes them together in half of the time
-            synced = {}
+            synced: dict[Path, Future[None]] = {}
             for at, content in files.items():
-                synced[at] = pool.submit(_sync, _write(ready[at], content))
+                try:
+                    stream = _write(ready[at], content)
+                except OSError as error:
+                    if error.errno not in (errno.EMFILE, errno.ENFILE):
+                        raise
+                    wait_for(synced.values())  # then these are closed
+                    stream = _write(ready[at], content)
+                synced[at] = pool.submit(_sync, stream)
             for at in synced:
                 synced[at].result()
         still()
