@@ -74,7 +74,11 @@ def _force(program: Program, row: int, motion: Executed) -> list[str]:
     for note in program.toolpath.annotations:
         if note.row <= row and note.text.upper().startswith("FORCE"):
             force = note.text
-    return [] if force == motion.force else [f"force {force!r} instead of {motion.force!r}"]
+    same = force == motion.force or {force, motion.force} <= {
+        None,
+        "FORCE OFF",
+    }  # before a comment no force acts
+    return [] if same else [f"force {force!r} instead of {motion.force!r}"]
 
 
 def other_numbers(row: int, pairs: Sequence[tuple[str, np.ndarray, float | None]]) -> list[str]:
