@@ -78,3 +78,39 @@ def test_a_routine_that_others_call_too():
     end = f"{LINE.format(1)}RETURN TRUE\nENDFCT\n"
     assert read(start + end)[0] == [(11, "?")]
     assert read(f"{start};FORCE 2 0 0\n{end}")[0] == [(12, "FORCE 2 0 0")]
+
+
+@pytest.mark.parametrize("condition", ["$IN[1]", "TRUE", "FALSE"])
+def test_a_comment_on_the_line_of_a_branch_counts_in_it(condition):
+    branches = f"IF {condition} THEN\n{LINE.format(1)}ELSE ;FORCE 2 0 0\n{LINE.format(2)}ENDIF ;FORCE 3 0 0\n"
+    rows = dict(read(f"{HEAD};FORCE 1 0 0\n{branches}{LINE.format(3)}END\n")[0])
+    assert rows[10] == "FORCE 3 0 0"
+    if condition != "FALSE":
+        assert rows[6] == "FORCE 1 0 0"
+    if condition != "TRUE":
+        assert rows[8] == "FORCE 2 0 0"
+
+
+@pytest.mark.parametrize(
+    ("value", "forces"),
+    [("1", ["FORCE 1 0 0"]), ("2", ["FORCE 2 0 0"]), ("3", []), ("$ANIN[1]", ["FORCE 1 0 0", "FORCE 2 0 0"])],
+)
+def test_a_comment_on_the_line_of_a_case_counts_in_it(value, forces):
+    cases = f"CASE 1 ;FORCE 1 0 0\n{LINE.format(1)}CASE 2 ;FORCE 2 0 0\nENDSWITCH\n{LINE.format(3)}"
+    rows, path = read(f"{HEAD}SWITCH {value}\n{cases}END\n")
+    assert [comment.text for comment in path.annotations] == forces
+    assert (rows[-1][1] == "?") == (len(forces) == 2)
+
+
+def test_a_comment_at_a_label_or_an_end_that_only_jumps_lead_to():
+    text = f"{HEAD}GOTO on\n{LINE.format(9)}on: ;FORCE 1 0 0\n{LINE.format(1)}END\n"
+    assert dict(read(text)[0])[7] == "FORCE 1 0 0"
+    text = f"{HEAD}IF $IN[1] THEN\nRETURN\nENDIF ;FORCE 1 0 0\n{LINE.format(1)}END\n"
+    assert read(text)[0] == [(7, "FORCE 1 0 0")]
+
+
+@pytest.mark.parametrize("last", ["FORCE OFF", "FORCE 2 0 0"])
+def test_a_comment_at_a_label_is_passed_again_by_jumps_back(last):
+    text = f"{HEAD}on: ;FORCE 1 0 0\n{LINE.format(1)};{last}\nIF $IN[1] THEN\nGOTO on\nENDIF\nEND\n"
+    assert read(text)[0] == [(5, "FORCE 1 0 0")]
+    assert read(text.replace("IF $IN[1] THEN\n", "").replace("ENDIF\n", ""))[0] == [(5, "FORCE 1 0 0")]

@@ -93,8 +93,9 @@ def split(src: str) -> tuple[str, dict[str, str]]:
 def _claims(path: Toolpath, tables: Tables) -> list[Claim]:
     forces = [""] * len(path)
     for comment in path.annotations:
-        word, _, said = comment.text.partition(" ")
+        word, *words = comment.text.split()
         if word.upper() == "FORCE":
+            said = " ".join(words)
             said = "" if said.upper() == "OFF" else said
             forces[comment.row :] = [said] * len(forces[comment.row :])
     return [_claim(path, row, tables, force) for row, force in enumerate(forces)]

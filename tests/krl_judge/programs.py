@@ -20,7 +20,7 @@
     spline     = SPLINE, then SPL and SLIN to full and partial points, ENDSPLINE
     jump       = IF .. THEN GOTO over what follows, or back as long as a counter or an input says
     form       = an inline form: FDAT, LDAT or PDAT, BAS(#CP_PARAMS,..), a point of the .dat
-    comment    = FORCE n 0 0, FORCE OFF between any two statements of a half of the programs
+    comment    = FORCE n 0 0, FORCE OFF between any two statements, or behind one, of a half of the programs
     idle       = HALT, WAIT SEC, WAIT FOR, $OUT[n]= (all stop the advance run), behind CONTINUE or not; a comment
     state      = $VEL.CP, $APO.CDIS, $ORI_TYPE, BAS(#VEL_CP,..), $OV_PRO
 
@@ -528,14 +528,18 @@ class Generator(Further):
 
 
 def with_forces(lines: list[str], rng: random.Random) -> list[str]:
-    """The program with FORCE comments between its statements, if it gets some."""
+    """The program with FORCE comments between its statements and behind them, if it gets some."""
     if rng.random() < 0.5:
         return lines
-    share, out = rng.choice([0.02, 0.06, 0.2]), []
+    share, out = rng.choice([0.02, 0.06, 0.2]), [""]
     for line, following in pairwise([*lines, "END"]):
-        out.append(line)
         word = line.partition(" ")[0]
         inside = not line.startswith("&") and word not in ("END", "ENDFCT", "CONTINUE", "SWITCH", "GLOBAL")
+        text = rng.choice([f";FORCE {rng.randint(1, 3)} 0 0", ";FORCE OFF"])
+        bare = not line.startswith(";") and line and word not in ("DEF", "DEFFCT") and out[-1] != "CONTINUE"
+        if inside and bare and rng.random() < share:
+            line += " " + text
+        out.append(line)
         if inside and not following.startswith(("DEF ", "DEFFCT")) and rng.random() < share:
-            out.append(rng.choice([f";FORCE {rng.randint(1, 3)} 0 0", ";FORCE OFF"]))
-    return out
+            out.append(text)
+    return out[1:]

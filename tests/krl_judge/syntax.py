@@ -15,7 +15,9 @@ _TOKEN = re.compile(
 )
 
 
-_FORCE = re.compile(r"[ \t]*;[ \t]*FORCE[ \t]+(.*?)[ \t]*\Z", re.I)
+_FORCE = re.compile(r"""(?:[^";]|"[^"]*")*;[ \t]*FORCE[ \t]+(.*?)[ \t]*\Z""", re.I)
+_BEHIND = ("ELSE", "CASE", "DEFAULT", "ENDIF", "ENDSWITCH")
+"""Words of lines whose comment counts where paths go on behind them; that of any other line counts in it."""
 
 
 def tokens(line: str) -> list[tuple[str, str]]:
@@ -227,9 +229,13 @@ def routines(text: str) -> list[Routine]:
         if line.lstrip().startswith("&") and not out:
             continue
         found = tokens(line)
+        said = _FORCE.match(line) if open_ else None
+        force = (
+            [] if said is None else [Line(number, [("name", ";force"), ("text", " ".join(said[1].split()))])]
+        )
         if not found:
-            if open_ and (force := _FORCE.match(line)):
-                out[-1].lines.append(Line(number, [("name", ";force"), ("text", force[1])]))
+            if force:
+                out[-1].lines += force
             continue
         words = [text for _, text in found[:3]]
         if words[0] == "GLOBAL" and words[1:2] in (["DEF"], ["DEFFCT"]):
@@ -249,9 +255,11 @@ def routines(text: str) -> list[Routine]:
             if words[0] in out[-1].labels:
                 raise Stop("a label twice")
             out[-1].labels[words[0]] = len(out[-1].lines)
-            out[-1].lines.append(Line(number, [("name", ";label")]))
+            out[-1].lines += [Line(number, [("name", ";label")]), *force]
+        elif words[0] in _BEHIND:
+            out[-1].lines += [Line(number, found), *force]
         else:
-            out[-1].lines.append(Line(number, found))
+            out[-1].lines += [*force, Line(number, found)]
     if open_ or not out:
         raise Stop("a routine is not closed")
     for routine in out:

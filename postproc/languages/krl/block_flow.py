@@ -101,6 +101,8 @@ class BlockFlow(OpenBlocks):
         chosen = self._chosen(pc, item, block) if self.reachable else None
         frame = self._push(block, chosen is not None)
         if chosen is not None and not block.has_labels:
+            if chosen in block.branches and self._item(chosen).comment:
+                self._comment(self._item(chosen))  # its line is jumped over
             return chosen if chosen == block.end else chosen + 1
         is_if = block.word == b"IF"
         frame.chosen = chosen
@@ -237,7 +239,8 @@ class BlockFlow(OpenBlocks):
                     frame.exits = run.flow()
         return block.start + 1
 
-    def _branch(self, pc: int, block: Block) -> int:
+    def _branch(self, pc: int, block: Block) -> int | None:
+        """Where it goes on; None where the block ends, as the branch before is the one that runs."""
         frame = self.stack[-1] if self.stack else None
         if frame is None or frame.block is not block:
             return pc + 1
@@ -245,7 +248,7 @@ class BlockFlow(OpenBlocks):
             self._end_opaque(frame)
             return pc + 1
         if frame.followed and not block.has_labels:
-            return block.end
+            return None
         frame.exits = self.run.merged(frame.exits, self._here())
         self._continue_with(frame.before if frame.chosen in (None, pc) else None)
         return pc + 1
@@ -348,6 +351,10 @@ class BlockFlow(OpenBlocks):
         if bounds is not None:
             run.variables.set(bounds[0], b"", AFTER_FOR)
         return None
+
+    @abstractmethod
+    def _comment(self, item: Statement) -> None:
+        """Takes up the comment of a line."""
 
     @abstractmethod
     def _call_functions(self, item: Statement) -> None:

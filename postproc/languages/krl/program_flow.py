@@ -62,6 +62,7 @@ from postproc.languages.krl.vectorised import Item, VectorisedLines
 from postproc.toolpath import Annotation
 from postproc.toolpath.meant_comments import meant_to_speak
 
+BRANCHING = (b"IF", b"SWITCH")
 _WAITS = tuple(Waits)
 
 
@@ -216,7 +217,7 @@ class ProgramFlow(Calls):
         if isinstance(item, VectorisedLines):
             motions.move_bulk(run, item)
             return pc + 1
-        if item.comment:
+        if item.comment and not self._is_behind(pc, item):
             self._comment(item)
         if run.walked and run.structure.aliases:
             self._forget_aliases(item)
@@ -262,8 +263,18 @@ class ProgramFlow(Calls):
             return self._call(pc, item, said)
         elif kind == StatementKind.LABEL and isinstance(said, bytes):
             self._label(pc, item, said)
+            self._comment_behind(item)
         elif kind == StatementKind.GOTO and isinstance(said, bytes):
-            return self._goto(pc, said)
+            there = self._goto(pc, said)
+            if 0 < there <= pc:
+                before = run.code[there - 1]
+                if (
+                    isinstance(before, Statement)
+                    and before.kind == StatementKind.LABEL
+                    and before.strings == said
+                ):
+                    self._comment_behind(before)  # what its line states is passed again
+            return there
         elif kind == StatementKind.EXIT:
             return self._exit(pc)
         elif kind in (StatementKind.RETURN, StatementKind.END):
@@ -322,10 +333,16 @@ class ProgramFlow(Calls):
             if what == StatementKind.OPEN:
                 return self._open(pc, item, block)
             if what == StatementKind.BRANCH:
-                return self._branch(pc, block)
+                there = self._branch(pc, block)
+                if there is None:  # the branch before it is the one that runs
+                    return block.end
+                self._comment_behind(item)
+                return there
             again = self._close(item, block)
             if again is not None:
                 return again
+            if block.word in BRANCHING:
+                self._comment_behind(item)
         return None
 
     def _pass_over(self, pc: int, item: Item) -> int | None:
@@ -337,9 +354,22 @@ class ProgramFlow(Calls):
             return pc + 1 if there is None else there
         if item.kind == StatementKind.LABEL and isinstance(item.strings, bytes):
             self._label(pc, item, item.strings)
+            self._comment_behind(item)
         elif item.kind == StatementKind.END:
             return self._leave(pc)
         return pc + 1
+
+    def _is_behind(self, pc: int, item: Statement) -> bool:
+        """Whether the comment of a line counts where paths go on: behind a label, a branch, the end of branches."""
+        return item.kind == StatementKind.LABEL or any(
+            what == StatementKind.BRANCH or (what == StatementKind.CLOSE and block.word in BRANCHING)
+            for what, block in self.run.structure.events.get(pc, ())
+        )
+
+    def _comment_behind(self, item: Statement) -> None:
+        """Takes up the comment of such a line, if a path leads on from it."""
+        if item.comment and self.reachable:
+            self._comment(item)
 
     def _comment(self, item: Statement) -> None:
         run = self.run
