@@ -5,6 +5,9 @@ axis turn by theta about its middle direction a.  Of a ball's round end, with th
 R theta^2 / 8 of the chord of its way: the distance is at least that to the chord, less both.  Of any cutter the
 distance at t is at least that of the cutter upright along a at the height of the middle of the line, less half of what
 it rises along a, and less half of theta times the distance of the point from the tip.
+
+The distance to a chord is convex, so around a place it is at least linear: of a ball four numbers bound the distance to
+a sweep in all of a cell that lies below its middle.
 """
 
 from __future__ import annotations
@@ -35,7 +38,13 @@ the tip across the axis; inverse of the chord's square [1/m2], 0 of none; axis (
 it is less; half of the turn [rad]; how far [m] the ball's middle rises at most on either side, or the tip is from the
 start at most; row of the cutter."""
 
+PLANE_COLUMNS = 4
+"""Columns of a plane, in single precision: least distance [m] at the middle of a cell, and its gradient (3,)."""
+
+NO_PLANE = -1.0  # m: a bound that nothing exceeds
+
 _DIGITS = 1e-12  # m
+_SINGLE = 1e-9  # m: more than the digits of a plane
 _BULGE = 0.126  # of R theta^2: an arc above its chord, 1/8 and what follows up to half a rad
 _LARGEST_TURN = 0.5
 
@@ -116,3 +125,26 @@ def is_far(bounds: Floats, cutters: Floats, j: int, x: float, y: float, z: float
     across = np.sqrt(ux * ux + uy * uy + uz * uz)
     d = cutter_distance(cutters, int(bounds[j, _CUTTER]), across, height)
     return bool(d - bounds[j, _OFF] - away * bounds[j, _HALF_TURN] > enough)
+
+
+@compiled
+def set_plane(bounds: Floats, cutters: Floats, j: int, x: float, y: float, z: float, half: float, plane: Floats) -> None:
+    """``plane`` (PLANE_COLUMNS,) of sweep ``j`` within ``half`` [m] of the middle [m] of a cell; bounds (M,
+    BOUND_COLUMNS), cutters (T, 6)."""
+    plane[:] = 0.0
+    plane[0] = NO_PLANE
+    if bounds[j, _KIND] != 1.0:
+        return
+    wx, wy, wz = x - bounds[j, _START], y - bounds[j, _START + 1], z - bounds[j, _START + 2]
+    dx, dy, dz = bounds[j, _CHORD], bounds[j, _CHORD + 1], bounds[j, _CHORD + 2]
+    t = min(max((wx * dx + wy * dy + wz * dz) * bounds[j, _INVERSE], 0.0), 1.0)
+    ux, uy, uz = wx - t * dx, wy - t * dy, wz - t * dz
+    wx, wy, wz = wx - 0.5 * dx, wy - 0.5 * dy, wz - 0.5 * dz
+    above = wx * bounds[j, _ALONG] + wy * bounds[j, _ALONG + 1] + wz * bounds[j, _ALONG + 2]
+    above += bounds[j, _RISE] + half
+    far = np.sqrt(wx * wx + wy * wy + wz * wz) + half
+    size = np.sqrt(ux * ux + uy * uy + uz * uz)
+    if above >= 0.0 or -above <= far * bounds[j, _HALF_TURN] or size < half:
+        return
+    plane[0] = size - cutters[int(bounds[j, _CUTTER]), RADIUS] - bounds[j, _OFF] - _SINGLE
+    plane[1], plane[2], plane[3] = ux / size, uy / size, uz / size

@@ -13,7 +13,14 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.process.stock.blank import Blank, blank_distance, corners_of, lent_blank
 from postproc.process.stock.borrowed import borrowed
-from postproc.process.stock.bounds import BOUND_COLUMNS, is_far, may_be_bounded, set_bound
+from postproc.process.stock.bounds import (
+    BOUND_COLUMNS,
+    PLANE_COLUMNS,
+    is_far,
+    may_be_bounded,
+    set_bound,
+    set_plane,
+)
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.distance import (
     ACROSS,
@@ -50,7 +57,8 @@ class Stock(NamedTuple):
     distances are known [m], and the numbers of cells from the blank's lowest corner; first (C + 1,) and near
     (E,): the sweeps that come that near to each cell, ascending; stop (E,): the last of the sweeps from that of
     ``near`` on that go on in one line and are near.  bounds (M, B): of the sweeps, B columns, or of
-    none; whoever changes a sweep sets its bound again.
+    none; whoever changes a sweep sets its bound again.  planes (E, 4): of the entries of ``near``, or of none where
+    sweeps may be displaced.
     """
 
     blank: Blank
@@ -61,6 +69,7 @@ class Stock(NamedTuple):
     first: Ints
     near: Ints
     stop: Ints
+    planes: Floats
 
 
 def build_stock(
@@ -81,22 +90,25 @@ def build_stock(
         size *= 1.2
     shape = np.maximum(np.ceil(span / size).astype(np.int64), 1)
     cells = int(np.prod(shape))
-    none = np.zeros(1, np.int32)
+    none, plain = np.zeros(1, np.int32), np.zeros((0, PLANE_COLUMNS), np.float32)
     grid = np.array([size, max(0.5 * size, reach), *shape], float)
     bounds = np.zeros((len(sweeps) if may_be_bounded(sweeps) else 0, BOUND_COLUMNS))
     _set_bounds(sweeps, cutters, bounds)
-    stock = Stock(blank, sweeps, bounds, cutters, grid, np.zeros(1, np.int64), none, none)
+    stock = Stock(blank, sweeps, bounds, cutters, grid, np.zeros(1, np.int64), none, none, plain)
     count, covered = np.zeros(cells, np.int64), np.full(cells, np.iinfo(np.int32).max, np.int32)
     _mark_outside(stock, covered)
     live = np.full((len(sweeps), 2), [np.inf, -np.inf])
     joins = _go_on(sweeps)
-    _list(stock, joins, (count, none, none), covered, live, False, slack)
+    _list(stock, joins, (count, none, none, plain), covered, live, False, slack)
     first = np.zeros(cells + 1, np.int64)
     np.cumsum(count, out=first[1:])
-    check_memory(len(sweeps), cells, int(first[-1]))
-    near, stop = (np.zeros(max(int(first[-1]), 1), np.int32) for _ in range(2))
-    _list(stock, joins, (first[:-1].copy(), near, stop), covered, live, True, slack)
-    return stock._replace(first=first, near=near, stop=stop), live
+    entries = max(int(first[-1]), 1)
+    bounded = entries if len(bounds) and slack == 0.0 else 0
+    check_memory(len(sweeps), cells, entries, bounded)
+    near, stop = (np.zeros(entries, np.int32) for _ in range(2))
+    planes = np.zeros((bounded, PLANE_COLUMNS), np.float32)
+    _list(stock, joins, (first[:-1].copy(), near, stop, planes), covered, live, True, slack)
+    return stock._replace(first=first, near=near, stop=stop, planes=planes), live
 
 
 def _go_on(sweeps: Floats) -> Bools:
@@ -127,6 +139,7 @@ def lent_stock(stock: Stock) -> Stock:
         borrowed(stock.first),
         borrowed(stock.near),
         borrowed(stock.stop),
+        borrowed(stock.planes),
     )
 
 
@@ -209,7 +222,7 @@ def _run_end(sweeps: Floats, cutters: Floats, joins: Bools, s: int) -> int:
 def _list(
     stock: Stock,
     joins: Bools,
-    lists: tuple[Ints, Ints, Ints],
+    lists: tuple[Ints, Ints, Ints, Floats],
     covered: Ints,
     live: Floats,
     fill: bool,
@@ -217,12 +230,13 @@ def _list(
 ) -> None:
     """What is listed of each cell counted, or with ``fill`` put into its place.
 
-    lists: numbers (C,) of each cell, or where its own start, and the lists ``near`` and ``stop`` (E,).  The sweeps of a
+    lists: numbers (C,) of each cell, or where its own start, and the lists ``near``, ``stop`` (E,), ``planes``.  The sweeps of a
     line, of which each ``joins`` (M,) the one before it, are looked at together: which of them are near a cell, and
     which covers it first, follows from where the cell is along the line.  With a ``slack`` each is listed for itself.
     """
     stock, joins, live, covered = lent_stock(stock), borrowed(joins), borrowed(live), borrowed(covered)
     count, near, stop = borrowed(lists[0]), borrowed(lists[1]), borrowed(lists[2])
+    planes = borrowed(lists[3])
     sweeps, cutters, size = stock.sweeps, stock.cutters, stock.grid[0]
     low = stock.blank.frame[1:4]
     shape = stock.grid[2:].astype(np.int64)
@@ -317,6 +331,8 @@ def _list(
                                 break
                             near[count[cell]] = m
                             stop[count[cell]] = near_last if slack == 0.0 else m
+                            if len(planes):
+                                set_plane(stock.bounds, cutters, m, x, y, z, half, planes[count[cell]])
                             count[cell] += 1
                         continue
                     for m in range(near_first, near_last + 1):
@@ -385,6 +401,10 @@ def _nearest(stock: Stock, x: float, y: float, z: float, time: int, depth: float
     cell = (i * int(grid[3]) + j) * int(grid[4]) + k
     low, high = stock.first[cell], stock.first[cell + 1]
     start = low
+    planes, bounded = stock.planes, len(stock.planes) > 0
+    dx = x - frame[1] - (i + 0.5) * size
+    dy = y - frame[2] - (j + 0.5) * size
+    dz = z - frame[3] - (k + 0.5) * size
     while low < high:  # the first that is not before ``time``
         middle = (low + high) // 2
         if stock.near[middle] < time:
@@ -394,9 +414,14 @@ def _nearest(stock: Stock, x: float, y: float, z: float, time: int, depth: float
     place = low - 1
     while place >= start:
         # on the positive side only a smaller distance counts
+        enough = max(best, depth)
+        if bounded and (
+            planes[place, 0] + planes[place, 1] * dx + planes[place, 2] * dy + planes[place, 3] * dz > enough
+        ):
+            place -= 1
+            continue
         first, last = int(stock.near[place]), min(int(stock.stop[place]), time - 1)
         place -= 1
-        enough = max(best, depth)
         if first != last:
             d = line_distance(stock.sweeps, stock.cutters, first, last, x, y, z, enough)
         elif is_far(stock.bounds, stock.cutters, last, x, y, z, enough):
