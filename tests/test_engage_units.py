@@ -45,6 +45,11 @@ def tool(**changed):
             {"holder": "{diameter: 63, from: 1524}"},
             "its holder starts 1524 mm above the tip, which the cell has",
         ),
+        ({"helix": 0.5236}, "has a helix of 0.5236 deg|is it in rad? it would be 30 deg"),
+        (
+            {"shank": 16, "holder": "{diameter: 6.3, from: 60}"},
+            "holder with the diameter 6.3 mm, below that of its shank",
+        ),
         ({"length": 600}, "its edges end 600 mm above the tip"),
         ({"spindle": 72000}, "diameter 16 mm, turns at 72000 1/min"),  # deg/s
         (

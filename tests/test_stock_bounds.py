@@ -1,13 +1,21 @@
-"""The bound by which a sweep counts as far never passes over one that is near."""
+"""What saves the distance to a sweep never passes over one that is near, and a larger blank costs nothing."""
 
 import numpy as np
 import pytest
 
 pytest.importorskip("numba")
 
-from stock_cases import BALL, BULL, CONE, FLAT, block, path_through, sweeps_of
+from stock_cases import BALL, BULL, CONE, FLAT, block, path_through, run, sweeps_of
 
-from postproc.process.stock.bounds import BOUND_COLUMNS, is_far, may_be_bounded, set_bound
+from postproc.process.stock.bounds import (
+    BOUND_COLUMNS,
+    PLANE_COLUMNS,
+    is_far,
+    may_be_bounded,
+    set_bound,
+    set_plane,
+)
+from postproc.process.stock.cells import build_stock
 from postproc.process.stock.distance import pose_distance
 
 
@@ -50,3 +58,51 @@ def test_what_is_far_by_its_bound_is_far(cutter, five):
                         tight += 1
     assert far > 0.1 * seen
     assert tight < 0.5 * seen
+
+
+@pytest.mark.parametrize("five", [False, True])
+def test_a_plane_is_a_lower_bound_in_all_of_its_cell(five):
+    cutters, half = np.array([BALL.numbers]), 0.6e-3
+    bounded, close = 0, 0
+    for seed in range(6):
+        path = path_through(*random_path(seed, five))
+        rows = np.ascontiguousarray(sweeps_of(path, block([0, 0, -40], [100, 60, 0]), BALL)[0].rows)
+        bounds, plane = np.zeros((len(rows), BOUND_COLUMNS)), np.zeros(PLANE_COLUMNS, np.float32)
+        rng = np.random.default_rng(200 + seed)
+        for j in range(len(rows)):
+            set_bound(rows, cutters, j, bounds[j])
+            for _ in range(6):
+                tip = rows[j, :3] + rng.uniform() * rows[j, 3:6]
+                middle = tip + rng.normal(0, 0.003, 3) + rng.uniform(-0.001, 0.006) * rows[j, 6:9]
+                set_plane(bounds, cutters, j, *middle, half, plane)
+                off = rng.normal(0, 1, 3)
+                off *= half * rng.uniform() ** (1 / 3) / np.linalg.norm(off)
+                x, y, z = middle + off
+                least = min(
+                    pose_distance(rows, cutters, j, share, x, y, z) for share in np.linspace(0, 1, 401)
+                )
+                bound = plane[0] + plane[1:] @ off
+                if plane[0] > -0.1:
+                    bounded += 1
+                    assert bound < max(least, 0.0)
+                    close += least < 0.0 or bound > least - 0.15e-3
+    assert bounded > 100
+    assert close > 0.7 * bounded
+
+
+@pytest.mark.parametrize("cutter", [BALL, FLAT], ids=lambda one: one.shape)
+def test_a_blank_that_is_larger_than_the_program_needs_no_more(cutter):
+    """The same cells and entries, and the same result, whether the blank goes on below or not."""
+    points = np.array([[x, y, -1.0] for y in range(10, 16) for x in (10, 30)[:: 1 - 2 * (y % 2)]])
+    path = path_through(points)
+    found = []
+    for bottom in (-30, -300):
+        blank = block([0, 0, bottom], [60, 40, 0])
+        rows = sweeps_of(path, blank, cutter)[0].rows
+        stock, _ = build_stock(blank, np.ascontiguousarray(rows), np.array([cutter.numbers]))
+        found.append((len(stock.first), len(stock.near), run(path, blank, cutter)))
+    (cells, entries, one), (more, others, two) = found
+    assert (more, others) == (cells, entries)
+    for name in ("mean", "largest", "volume", "depth", "width", "entry", "exit"):
+        assert np.array_equal(getattr(one, name), getattr(two, name), equal_nan=True)
+    assert one.cuts.sum() > 5

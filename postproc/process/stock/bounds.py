@@ -128,7 +128,9 @@ def is_far(bounds: Floats, cutters: Floats, j: int, x: float, y: float, z: float
 
 
 @compiled
-def set_plane(bounds: Floats, cutters: Floats, j: int, x: float, y: float, z: float, half: float, plane: Floats) -> None:
+def set_plane(
+    bounds: Floats, cutters: Floats, j: int, x: float, y: float, z: float, half: float, plane: Floats
+) -> None:
     """``plane`` (PLANE_COLUMNS,) of sweep ``j`` within ``half`` [m] of the middle [m] of a cell; bounds (M,
     BOUND_COLUMNS), cutters (T, 6)."""
     plane[:] = 0.0

@@ -14,7 +14,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.findings import Finding
-from postproc.base.units import MM
+from postproc.base.units import DEG, MM
 from postproc.process.stock.blank import corners_of
 from postproc.process.stock.cutters import Cutter
 from postproc.process.stock.distance import AXIS, CUTTER, REMOVES, STEP, TIP_POINT, TURN
@@ -29,6 +29,7 @@ THINNEST, THICKEST = 1.0 * MM, 200.0 * MM
 DEEPEST_SLOT, DEEPEST = 4.0, 12.0
 """Diameters: of a cut that is at least half as wide as the tool, and of any, but for drills."""
 _WIDE = 0.5
+LEAST_HELIX = 2.0 * DEG
 FASTEST = 5000.0 / 60
 """[m/s] of the edges: nothing is cut faster."""
 FASTEST_TURN, TURNS_FAST = 60000 * 2 * np.pi / 60, 10.0 * MM
@@ -96,6 +97,7 @@ def contradictions(
         known = turning[np.isfinite(turning)]
         for message, help in (
             *_sizes(cutter, found, diameters.get(cutter.number), tip.get(cutter.number)),
+            *_helix_and_holder(cutter),
             *_edges(cutter, float(known.max(initial=0.0))),
             *_sideways(cutter, index, sweeps, cut.cuts, toolpath),
         ):
@@ -166,6 +168,21 @@ def _sizes(
                 " flange"
             )
             yield message, "compare the length with that of the tool in the cell; state mm"
+
+
+def _helix_and_holder(cutter: Cutter) -> Iterator[tuple[str, str]]:
+    """Message and help where helix or holder are of no tool."""
+    name = f"tool {cutter.number}"
+    if cutter.helix is not None and 0.0 < abs(cutter.helix) < LEAST_HELIX:
+        angle = cutter.helix / DEG
+        message = f"{name} has a helix of {angle:.4g} deg, less than any cutter that is not straight"
+        yield message, f"is it in rad? it would be {angle / DEG:.4g} deg; state deg, or 0 for straight edges"
+    if cutter.shank is not None and cutter.holder is not None and cutter.holder[0] < cutter.shank:
+        holder, shank = 2 * cutter.holder[0] / MM, 2 * cutter.shank / MM
+        message = (
+            f"{name} has a holder with the diameter {holder:.6g} mm, below that of its shank, {shank:.6g} mm"
+        )
+        yield message, "compare both: diameters, in mm"
 
 
 def _reason(ratio: float) -> str:
