@@ -1,10 +1,14 @@
 """What the simulation of the stock costs: processor time and memory of programs of short motions in a block.
 
-    python -m tests.benchmarks.stock --sizes 1000,4000,16000 [--stock 1,2,4] [--part 100000] [--five-axes]
+    python -m tests.benchmarks.stock --sizes 1000,4000,16000 [--stock 1,2,4] [--part 100000]
+    python -m tests.benchmarks.stock --sizes 3000,10000 --five-axes [--beside] [--lists]
 
 Zigzag in levels of 2 mm of 4 mm between the rows, motions of 1 mm, a cutter of 16 mm; every level ends with a rapid.
 ``--stock``: the block of the last size made so many times larger in each direction of the plane.  ``--five-axes``: a
-ball of 10 mm in rows of 0.5 mm and levels of 0.5 mm, whose spindle swings by 17 deg to either side along its rows.
+ball of 10 mm in rows of 0.5 mm and levels of 0.5 mm, whose spindle swings by 17 deg to either side along its rows; a
+level has 41,200 motions, so more motions cut what more rows have cut before.  ``--beside``: all rows in one level, in a
+blank as wide as they need.  ``--lists``: no times, but among how many sweeps the stock looks: for the mean entry of a
+list, the entries of its cell.
 """
 
 from __future__ import annotations
@@ -25,6 +29,7 @@ from stock_cases import BALL, FLAT, block, path_through, run
 from postproc.part.deflected_sweeps import deflect
 from postproc.part.surface import find_surface
 from postproc.part.surface_error import find_errors
+from postproc.process.stock.cells import build_stock
 
 LENGTH, WIDTH, LEVEL = 200.0, 100.0, 2.0
 
@@ -47,13 +52,13 @@ def program(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array(points[:count]), np.array(kinds[:count])
 
 
-def ball_program(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """(count, 3) tip positions [mm] and spindle directions (count, 3) of rows in levels."""
+def ball_program(count: int, beside: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """(count, 3) tip positions [mm] and spindle directions (count, 3) of rows in levels, or ``beside`` one another."""
     row = np.arange(-3, LENGTH + 3, 1.0)
     many = np.arange(count)
     index, place = many // len(row), many % len(row)
     x = row[np.where(index % 2 == 0, place, len(row) - 1 - place)]
-    across = 2 * int(WIDTH)
+    across = count if beside else 2 * int(WIDTH)
     y, level = 0.5 * (index % across), index // across
     z = -0.5 * (level + 1) - 0.3 * np.sin(x / 15) - 0.3
     lean = np.column_stack([0 * x, np.sin(0.3 * np.sin(x / 20)), np.cos(0.3 * np.sin(x / 20))])
@@ -61,16 +66,30 @@ def ball_program(count: int) -> tuple[np.ndarray, np.ndarray]:
     return tips, lean
 
 
-def measure(count: int, larger: float = 1.0, five: bool = False) -> tuple[float, float, int]:
+def measure(
+    count: int, larger: float = 1.0, five: bool = False, beside: bool = False
+) -> tuple[float, float, int]:
     """Processor seconds, peak memory [GB] of the process so far, and the motions that cut."""
     points, kinds = program(count)
-    tips, axes = ball_program(count)
+    tips, axes = ball_program(count, beside)
     path = path_through(tips, axes) if five else path_through(points, kinds=kinds)
     start = time.process_time()
-    size = [LENGTH * larger, WIDTH * larger, 0]
+    width = tips[:, 1].max() + 10.0 if beside else WIDTH
+    size = [LENGTH * larger, width * larger, 0]
     cut = run(path, block([0, 0, -60], size), BALL if five else FLAT)
     used = time.process_time() - start
     return used, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, int(cut.cuts.sum())
+
+
+def measure_lists(count: int, beside: bool) -> tuple[float, int, float]:
+    """Size of the cells [mm], entries of their lists, and how many the cell of the mean entry has: those before a sweep
+    are what a query of it asks of."""
+    tips, axes = ball_program(count, beside)
+    blank = block([0, 0, -60], [LENGTH, tips[:, 1].max() + 10.0 if beside else WIDTH, 0])
+    sweeps, _ = sweeps_of(path_through(tips, axes), blank, BALL)
+    stock, _ = build_stock(blank, np.ascontiguousarray(sweeps.rows), np.array([BALL.numbers]))
+    entries = np.diff(stock.first).astype(float)
+    return stock.grid[0] * 1e3, int(entries.sum()), float((entries**2).sum() / entries.sum())
 
 
 def measure_part(count: int, points: int) -> tuple[float, ...]:
@@ -99,7 +118,15 @@ def main() -> None:
     parser.add_argument("--stock", default="1")
     parser.add_argument("--part", type=int, default=0, help="measure the part instead, at so many points")
     parser.add_argument("--five-axes", action="store_true")
+    parser.add_argument("--beside", action="store_true")
+    parser.add_argument("--lists", action="store_true")
     given = parser.parse_args()
+    if given.lists:
+        print("motions  cells mm  entries   of its cell")
+        for word in given.sizes.split(","):
+            size, entries, mean = measure_lists(int(word), given.beside)
+            print(f"{int(word):7}  {size:8.3f}  {entries:8}  {mean:11.1f}", flush=True)
+        return
     if given.part:
         measure_part(50, 1000)
         print("motions  points   own    CPU s surface  deflected  errors  GB")
@@ -116,7 +143,7 @@ def main() -> None:
     rows += [(sizes[-1], float(word)) for word in given.stock.split(",") if float(word) != 1.0]
     print("motions  stock  cut     CPU s  us a motion  GB")
     for size, larger in rows:
-        used, memory, cut = measure(size, larger, given.five_axes)
+        used, memory, cut = measure(size, larger, given.five_axes, given.beside)
         print(
             f"{size:7}  {larger:5g}  {cut:6}  {used:5.2f}  {used / size * 1e6:11.0f}  {memory:.2f}",
             flush=True,

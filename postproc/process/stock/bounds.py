@@ -13,6 +13,7 @@ a sweep in all of a cell that lies below its middle.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from postproc.base.arrays import Floats
 from postproc.process.stock.compiled import compiled
@@ -38,6 +39,7 @@ the tip across the axis; inverse of the chord's square [1/m2], 0 of none; axis (
 it is less; half of the turn [rad]; how far [m] the ball's middle rises at most on either side, or the tip is from the
 start at most; row of the cutter."""
 
+Singles = NDArray[np.float32]
 PLANE_COLUMNS = 4
 """Columns of a plane, in single precision: least distance [m] at the middle of a cell, and its gradient (3,)."""
 
@@ -129,7 +131,7 @@ def is_far(bounds: Floats, cutters: Floats, j: int, x: float, y: float, z: float
 
 @compiled
 def set_plane(
-    bounds: Floats, cutters: Floats, j: int, x: float, y: float, z: float, half: float, plane: Floats
+    bounds: Floats, cutters: Floats, j: int, x: float, y: float, z: float, half: float, plane: Singles
 ) -> None:
     """``plane`` (PLANE_COLUMNS,) of sweep ``j`` within ``half`` [m] of the middle [m] of a cell; bounds (M,
     BOUND_COLUMNS), cutters (T, 6)."""

@@ -16,6 +16,7 @@ from postproc.process.stock.borrowed import borrowed
 from postproc.process.stock.bounds import (
     BOUND_COLUMNS,
     PLANE_COLUMNS,
+    Singles,
     is_far,
     may_be_bounded,
     set_bound,
@@ -65,7 +66,7 @@ class Stock(NamedTuple):
     first: Ints
     near: Ints
     stop: Ints
-    planes: Floats
+    planes: Singles
 
 
 def build_stock(
@@ -191,7 +192,7 @@ def _run_end(sweeps: Floats, cutters: Floats, joins: Bools, s: int) -> int:
 def _list(
     stock: Stock,
     joins: Bools,
-    lists: tuple[Ints, Ints, Ints, Floats],
+    lists: tuple[Ints, Ints, Ints, Singles],
     covered: Ints,
     live: Floats,
     fill: bool,
