@@ -1,11 +1,11 @@
-"""What saves the distance to a sweep never passes over one that is near, and a larger blank costs nothing."""
+"""What saves the distance to a sweep never passes over one that is near."""
 
 import numpy as np
 import pytest
 
 pytest.importorskip("numba")
 
-from stock_cases import BALL, BULL, CONE, FLAT, block, path_through, run, sweeps_of
+from stock_cases import BALL, BULL, CONE, FLAT, block, path_through, sweeps_of
 
 from postproc.process.stock.bounds import (
     BOUND_COLUMNS,
@@ -15,7 +15,6 @@ from postproc.process.stock.bounds import (
     set_bound,
     set_plane,
 )
-from postproc.process.stock.cells import build_stock
 from postproc.process.stock.distance import pose_distance
 
 
@@ -88,21 +87,3 @@ def test_a_plane_is_a_lower_bound_in_all_of_its_cell(five):
                     close += least < 0.0 or bound > least - 0.15e-3
     assert bounded > 100
     assert close > 0.7 * bounded
-
-
-@pytest.mark.parametrize("cutter", [BALL, FLAT], ids=lambda one: one.shape)
-def test_a_blank_that_is_larger_than_the_program_needs_no_more(cutter):
-    """The same cells and entries, and the same result, whether the blank goes on below or not."""
-    points = np.array([[x, y, -1.0] for y in range(10, 16) for x in (10, 30)[:: 1 - 2 * (y % 2)]])
-    path = path_through(points)
-    found = []
-    for bottom in (-30, -300):
-        blank = block([0, 0, bottom], [60, 40, 0])
-        rows = sweeps_of(path, blank, cutter)[0].rows
-        stock, _ = build_stock(blank, np.ascontiguousarray(rows), np.array([cutter.numbers]))
-        found.append((len(stock.first), len(stock.near), run(path, blank, cutter)))
-    (cells, entries, one), (more, others, two) = found
-    assert (more, others) == (cells, entries)
-    for name in ("mean", "largest", "volume", "depth", "width", "entry", "exit"):
-        assert np.array_equal(getattr(one, name), getattr(two, name), equal_nan=True)
-    assert one.cuts.sum() > 5

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
-from postproc.process.stock.blank import Blank, blank_distance, lent_blank
+from postproc.process.stock.blank import Blank, blank_distance, corners_of, lent_blank
 from postproc.process.stock.borrowed import borrowed
 from postproc.process.stock.bounds import (
     BOUND_COLUMNS,
@@ -22,26 +22,30 @@ from postproc.process.stock.bounds import (
     set_bound,
     set_plane,
 )
-from postproc.process.stock.cell_grid import grid_around, sweep_box
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.distance import (
     ACROSS,
+    ANGLE,
     AXIS,
     CUTTER,
+    LENGTH,
     MODE,
     RADIUS,
     REMOVES,
     STEP,
     TIP_POINT,
+    arc_of,
     axis_at,
     cutter_distance,
     line_distance,
     swept_distance,
     tip_at,
+    turn_of,
 )
 from postproc.process.stock.memory_need import check_memory
 
 CELL = 0.125  # radii of the smallest cutter
+MOST_CELLS = 4_000_000
 LARGEST_CELL, SMALLEST_CELL = 4e-3, 0.25e-3  # m
 _SAME = 1e-12  # m, and of unit vectors
 _RUN = 4.0  # radii: of the part of a line whose sweeps are listed together
@@ -50,10 +54,10 @@ _RUN = 4.0  # radii: of the part of a line whose sweeps are listed together
 class Stock(NamedTuple):
     """A blank with all that is removed from it.
 
-    blank: see ``Blank``; sweeps (M, ROW), cutters (T, 6): see ``distance``; grid (8,): size [m] of the cells, how far
-    distances are known [m], the numbers of cells, and their lowest corner [m]; outside of them no sweep is near.
-    first (C + 1,) and near (E,): the sweeps that come that near to each cell, ascending; stop (E,): the last of the
-    sweeps from that of ``near`` on that go on in one line and are near.  bounds (M, B): of the sweeps, B columns, or of
+    blank: see ``Blank``; sweeps (M, ROW), cutters (T, 6): see ``distance``; grid (5,): size [m] of the cells, how far
+    distances are known [m], and the numbers of cells from the blank's lowest corner; first (C + 1,) and near
+    (E,): the sweeps that come that near to each cell, ascending; stop (E,): the last of the sweeps from that of
+    ``near`` on that go on in one line and are near.  bounds (M, B): of the sweeps, B columns, or of
     none; whoever changes a sweep sets its bound again.  planes (E, 4): of the entries of ``near``, or of none where
     sweeps may be displaced.
     """
@@ -78,12 +82,17 @@ def build_stock(
     ``reach`` [m]: distances are known so far at least.  ``slack`` [m]: by so much the sweeps may still be displaced,
     each by another shift, without being listed again.  Refusal STK031: more memory is needed than is free.
     """
+    low, high = corners_of(blank)
+    span = high - low
     radius = float(cutters[:, RADIUS].min()) if len(cutters) else LARGEST_CELL
     size = min(max(CELL * radius, SMALLEST_CELL), LARGEST_CELL)
-    low, shape, size = grid_around(blank, sweeps, cutters, max(size, reach, slack))
+    size = max(size, reach, slack, float(np.cbrt(np.prod(span) / MOST_CELLS)))
+    while np.prod(np.ceil(span / size)) > 2 * MOST_CELLS:  # thin blanks
+        size *= 1.2
+    shape = np.maximum(np.ceil(span / size).astype(np.int64), 1)
     cells = int(np.prod(shape))
     none, plain = np.zeros(1, np.int32), np.zeros((0, PLANE_COLUMNS), np.float32)
-    grid = np.array([size, max(0.5 * size, reach), *shape, *low], float)
+    grid = np.array([size, max(0.5 * size, reach), *shape], float)
     bounds = np.zeros((len(sweeps) if may_be_bounded(sweeps) else 0, BOUND_COLUMNS))
     _set_bounds(sweeps, cutters, bounds)
     stock = Stock(blank, sweeps, bounds, cutters, grid, np.zeros(1, np.int64), none, none, plain)
@@ -146,8 +155,8 @@ def _set_bounds(sweeps: Floats, cutters: Floats, bounds: Floats) -> None:
 def _mark_outside(stock: Stock, covered: Ints) -> None:
     stock = lent_stock(stock)
     blank, size = stock.blank, stock.grid[0]
-    low = stock.grid[5:]
-    shape = stock.grid[2:5].astype(np.int64)
+    low = blank.frame[1:4]
+    shape = stock.grid[2:].astype(np.int64)
     half = size * np.sqrt(0.75)
     for i in range(shape[0]):
         for j in range(shape[1]):
@@ -158,6 +167,28 @@ def _mark_outside(stock: Stock, covered: Ints) -> None:
                 # of a mesh distances are known up to its reach only
                 if blank_distance(blank, x, y, z) < -half:
                     covered[(i * shape[1] + j) * shape[2] + k] = -1
+
+
+@compiled
+def sweep_box(sweeps: Floats, cutters: Floats, j: int, box: Floats) -> None:
+    """The corners [m] of a box around sweep ``j`` put into ``box`` (2, 3).  sweeps (M, 22), cutters (T, 6)."""
+    c = int(sweeps[j, CUTTER])
+    radius, length = cutters[c, RADIUS], cutters[c, LENGTH]
+    box[0, :], box[1, :] = np.inf, -np.inf
+    turn = turn_of(sweeps, j)
+    parts = 1 if turn == 0.0 and sweeps[j, ANGLE] == 0.0 else 8
+    for step in range(parts + 1):
+        tip, axis = tip_at(sweeps, j, step / parts), axis_at(sweeps, j, step / parts)
+        for k in range(3):
+            disc = radius * np.sqrt(max(1.0 - axis[k] ** 2, 0.0))
+            box[0, k] = min(box[0, k], tip[k] + min(length * axis[k], 0.0) - disc)
+            box[1, k] = max(box[1, k], tip[k] + max(length * axis[k], 0.0) + disc)
+    if parts > 1:  # what an arc rises above its chords
+        bulge = length * (1.0 - np.cos(0.5 * turn / parts))
+        if sweeps[j, ANGLE] != 0.0:
+            bulge += arc_of(sweeps, j)[0] * (1.0 - np.cos(0.5 * sweeps[j, ANGLE] / parts))
+        box[0, :] -= bulge
+        box[1, :] += bulge
 
 
 @compiled
@@ -208,8 +239,8 @@ def _list(
     count, near, stop = borrowed(lists[0]), borrowed(lists[1]), borrowed(lists[2])
     planes = borrowed(lists[3])
     sweeps, cutters, size = stock.sweeps, stock.cutters, stock.grid[0]
-    low = stock.grid[5:]
-    shape = stock.grid[2:5].astype(np.int64)
+    low = stock.blank.frame[1:4]
+    shape = stock.grid[2:].astype(np.int64)
     half = size * np.sqrt(0.75)
     limit = half + stock.grid[1] + slack
     box, other = np.zeros((2, 3)), np.zeros((2, 3))
@@ -364,15 +395,17 @@ def _nearest(stock: Stock, x: float, y: float, z: float, time: int, depth: float
     if best <= 0.0:
         return max(best, -reach), owner, end
     best = min(best, reach)
-    wx, wy, wz = x - grid[5], y - grid[6], z - grid[7]
-    i, j, k = int(np.floor(wx / size)), int(np.floor(wy / size)), int(np.floor(wz / size))
-    if min(i, min(j, k)) < 0 or i >= grid[2] or j >= grid[3] or k >= grid[4]:
-        return best, owner, end
+    frame = stock.blank.frame
+    i = min(int((x - frame[1]) / size), int(grid[2]) - 1)
+    j = min(int((y - frame[2]) / size), int(grid[3]) - 1)
+    k = min(int((z - frame[3]) / size), int(grid[4]) - 1)
     cell = (i * int(grid[3]) + j) * int(grid[4]) + k
     low, high = stock.first[cell], stock.first[cell + 1]
     start = low
     planes, bounded = stock.planes, len(stock.planes) > 0
-    dx, dy, dz = wx - (i + 0.5) * size, wy - (j + 0.5) * size, wz - (k + 0.5) * size
+    dx = x - frame[1] - (i + 0.5) * size
+    dy = y - frame[2] - (j + 0.5) * size
+    dz = z - frame[3] - (k + 0.5) * size
     while low < high:  # the first that is not before ``time``
         middle = (low + high) // 2
         if stock.near[middle] < time:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from postproc.base.findings import Finding, Refusal
 from postproc.base.memory import free_memory
 
-OF_A_SWEEP, OF_A_CELL, OF_AN_ENTRY, OF_A_PLANE = 2000, 30, 8, 16
-"""Bytes at the peak: of a part of a motion that cuts in all arrays of a run, of a cell of the blank, of an entry of its
-list, and of what bounds the distance to it."""
+OF_A_SWEEP, OF_A_CELL, OF_AN_ENTRY, OF_A_PLANE = 1200, 30, 8, 16
+"""Bytes at the peak: of a part of a motion in all arrays of a run, of a cell of the blank, of an entry of its list, and
+of what bounds the distance to it."""
 
 SHARE = 0.8
 """Of the free memory that a stock may take."""
