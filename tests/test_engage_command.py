@@ -100,6 +100,20 @@ def test_the_next_program_finds_what_the_first_left(folder):
     refused(folder, "STK008", "no motion cuts")
 
 
+@pytest.mark.parametrize(
+    ("option", "name"), [("--stock-out", "one.stock"), ("--csv", "milling.yaml"), ("--json", "part.ngc")]
+)
+def test_no_output_replaces_an_input(folder, option, name):
+    """What an earlier program left would be lost, and the next run would start from something else."""
+    call(folder, "--stock-out", folder / "one.stock")
+    state(folder, "stock: {from: one.stock}\n" + TOOLS)
+    (folder / "part.ngc").write_text(SLOT.replace("Y30", "Y38"))
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    result = CliRunner().invoke(main, ["engage", str(folder / "part.ngc"), option, str(folder / name)])
+    assert result.exit_code in (1, 2), result.output
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
 @pytest.mark.slow
 def test_a_blank_as_a_mesh_is_that_of_the_box(folder):
     whole = json.loads(call(folder, "--json", "-").stdout)

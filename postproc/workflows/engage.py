@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.base.findings import Finding, Refusal
+from postproc.base.input_files import Inputs, noted
 from postproc.base.paged_memory import large_arrays_in_files
 from postproc.base.units import MM
 from postproc.cell import frames_of
@@ -41,11 +42,11 @@ class EngageRequest:
 
 def engage(request: EngageRequest, stage: Stage = silent) -> Engaged:
     """What each motion cuts, and with which force.  Raises Refusal, and has then written nothing."""
-    with large_arrays_in_files(request.program):
-        return _engage(request, stage)
+    with large_arrays_in_files(request.program), noted() as inputs:
+        return _engage(request, inputs, stage)
 
 
-def _engage(request: EngageRequest, stage: Stage) -> Engaged:
+def _engage(request: EngageRequest, inputs: Inputs, stage: Stage) -> Engaged:
     cell = cell_of(Request(request.program, cell=request.cell, robot=request.robot))
     process = request.process
     if process is None and cell.process is not None:
@@ -131,5 +132,6 @@ def _engage(request: EngageRequest, stage: Stage) -> Engaged:
         files[request.stock_out] = run.stock_file()
     if request.json is not None:
         files[request.json] = json_bytes(engaged)
+    inputs.refuse_outputs(files)
     write_atomically(files)
     return engaged
