@@ -533,13 +533,13 @@ def with_forces(lines: list[str], rng: random.Random) -> list[str]:
         return lines
     share, out = rng.choice([0.02, 0.06, 0.2]), [""]
     for line, following in pairwise([*lines, "END"]):
-        word = line.partition(" ")[0]
-        inside = not line.startswith("&") and word not in ("END", "ENDFCT", "CONTINUE", "SWITCH", "GLOBAL")
+        inside = not line.startswith("&")
         text = rng.choice([f";FORCE {rng.randint(1, 3)} 0 0", ";FORCE OFF"])
-        bare = not line.startswith(";") and line and word not in ("DEF", "DEFFCT") and out[-1] != "CONTINUE"
+        bare = line and not line.startswith(";")
         if inside and bare and rng.random() < share:
             line += " " + text
         out.append(line)
-        if inside and not following.startswith(("DEF ", "DEFFCT")) and rng.random() < share:
+        outside = line in ("END", "ENDFCT") or following.startswith(("DEF ", "DEFFCT", "GLOBAL DEF"))
+        if inside and not outside and not line.startswith("SWITCH ") and rng.random() < share:
             out.append(text)
     return out[1:]

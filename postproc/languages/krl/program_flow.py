@@ -18,6 +18,7 @@ from postproc.languages.krl.external_axes import by_themselves
 from postproc.languages.krl.flow_frames import Restart, Unfollowed
 from postproc.languages.krl.later_changes import EVENTS, later_actions, later_functions
 from postproc.languages.krl.lexing import (
+    SPLINES,
     Assignment,
     Call,
     Declared,
@@ -62,7 +63,6 @@ from postproc.languages.krl.vectorised import Item, VectorisedLines
 from postproc.toolpath import Annotation
 from postproc.toolpath.meant_comments import meant_to_speak
 
-BRANCHING = (b"IF", b"SWITCH")
 _WAITS = tuple(Waits)
 
 
@@ -104,6 +104,7 @@ class ProgramFlow(Calls):
         for i, (name, _) in enumerate(routine.parameters):
             value = args[i] if i < len(args) else None
             run.variables.replace(name, {} if value is None else {b"": run.converted(name, value)})
+        self._comment_behind(self._item(routine.start))
         pc: int | None = routine.start + 1
         while pc is not None and pc < len(run.code):
             pc = self._step(pc)
@@ -137,6 +138,7 @@ class ProgramFlow(Calls):
 
     def _run(self, routine: Routine) -> None:
         run = self.run
+        self._comment_behind(self._item(routine.start))
         pc: int | None = routine.start + 1
         outside = routine.end + 1 if run.structure.has_routine else len(run.code)
         while pc is not None and pc < len(run.code) and (pc < outside or run.routine is not routine):
@@ -341,7 +343,7 @@ class ProgramFlow(Calls):
             again = self._close(item, block)
             if again is not None:
                 return again
-            if block.word in BRANCHING:
+            if block.word not in SPLINES:
                 self._comment_behind(item)
         return None
 
@@ -360,9 +362,9 @@ class ProgramFlow(Calls):
         return pc + 1
 
     def _is_behind(self, pc: int, item: Statement) -> bool:
-        """Whether the comment of a line counts where paths go on: behind a label, a branch, the end of branches."""
+        """Whether the comment of a line counts where paths go on: behind a label, or a line of a block."""
         return item.kind == StatementKind.LABEL or any(
-            what == StatementKind.BRANCH or (what == StatementKind.CLOSE and block.word in BRANCHING)
+            block.word not in SPLINES and (what != StatementKind.OPEN or block.word != b"SWITCH")
             for what, block in self.run.structure.events.get(pc, ())
         )
 

@@ -116,12 +116,21 @@ class _Surveyor:
         self.noted: set[bytes] = set()  # statements of that block, which say no more a second time
 
     def take(self, index: int, statement: Statement) -> None:
-        kind, stack = statement.kind, self.stack
+        if statement.kind not in (StatementKind.OPEN, StatementKind.DEF):
+            self._note_comment(statement)
+        self._note(index, statement)
+        if statement.kind in (StatementKind.OPEN, StatementKind.DEF):
+            self._note_comment(statement)  # it is in what is opened
+
+    def _note_comment(self, statement: Statement) -> None:
         if statement.comment and ANNOTATION.match(statement.comment):
             changed = place_of(statement.comment[1:].decode("latin-1").strip())
             self.found.effects.add(changed)
-            if stack:
-                stack[-1].effects.add(changed)
+            if self.stack:
+                self.stack[-1].effects.add(changed)
+
+    def _note(self, index: int, statement: Statement) -> None:
+        kind, stack = statement.kind, self.stack
         if kind not in (StatementKind.MOTION, StatementKind.COMMENT) and not is_well_formed(statement):
             self._ill_formed(statement)
         if stack and stack[-1].word == b"SWITCH" and not stack[-1].branches:
