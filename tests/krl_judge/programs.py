@@ -217,7 +217,13 @@ class Generator(Further):
             ]
         else:
             inner = [f"PDAT_ACT=PPDAT{n}", f"FDAT_ACT=FP{n}", "BAS(#PTP_PARAMS,100)", f"PTP {point}"]
-        return [f";FOLD {inner[-1]} Vel=1 m/s", "$BWDSTART=FALSE", *inner, ";ENDFOLD"]
+        changes = [
+            f"FP{n}.{rng.choice(['BASE_NO', 'TOOL_NO'])}={rng.randint(1, 4)}",
+            f"LCPDAT{n}.{rng.choice(['VEL', 'APO_DIST'])}={rng.randint(1, 3)}",
+            f"FP{n}=FP{3 - n}",
+        ]
+        before = [rng.choice(changes)] if rng.random() < 0.1 else []
+        return [*before, f";FOLD {inner[-1]} Vel=1 m/s", "$BWDSTART=FALSE", *inner, ";ENDFOLD"]
 
     def idle(self) -> list[str]:
         n = self.rng.choice(INPUTS)
