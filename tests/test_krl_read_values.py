@@ -384,3 +384,11 @@ def test_an_ldat_that_the_program_changes_is_not_what_its_file_states(change: st
 )
 def test_an_int_that_overflows_has_no_value(value: str, known: bool) -> None:
     assert isinstance(evaluate(value.encode(), lambda name, path: None), UnknownValue) == (not known)
+
+
+@pytest.mark.parametrize(("declared", "known"), [("DECL POS P\n", True), ("", False)])
+def test_what_an_aggregate_omits_may_have_a_value_in_a_variable_of_another_file(
+    declared: str, known: bool
+) -> None:
+    path = body(f"{declared}{FULL}P={{X 7}}\nLIN P\n").toolpath
+    assert np.isfinite(path.position[1]).all() == known

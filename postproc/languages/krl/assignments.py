@@ -353,7 +353,8 @@ def _set_variable(run: ExecutionContext, assignment: Assignment) -> None:
         path = b"[" + indices + b"]"
     if not assignment.path:
         value = _value(run, assignment.value.rstrip(), assignment.at)
-        if isinstance(value, KrlTarget) and value.missing and run.variables.get(name, path) is not None:
+        has_value = run.variables.get(name, path) is not None or not run.trusted(name)
+        if isinstance(value, KrlTarget) and value.missing and has_value:
             missing = value.missing
             value = UnknownValue("KRL002", f"the aggregate assigned to {shown(name)} omits {missing}")
         keep(run, name, path, value)
