@@ -104,7 +104,7 @@ class ProgramFlow(Calls):
         for i, (name, _) in enumerate(routine.parameters):
             value = args[i] if i < len(args) else None
             run.variables.replace(name, {} if value is None else {b"": run.converted(name, value)})
-        self._comment_behind(self._item(routine.start))
+        self._comment_after(self._item(routine.start))
         pc: int | None = routine.start + 1
         while pc is not None and pc < len(run.code):
             pc = self._step(pc)
@@ -138,7 +138,7 @@ class ProgramFlow(Calls):
 
     def _run(self, routine: Routine) -> None:
         run = self.run
-        self._comment_behind(self._item(routine.start))
+        self._comment_after(self._item(routine.start))
         pc: int | None = routine.start + 1
         outside = routine.end + 1 if run.structure.has_routine else len(run.code)
         while pc is not None and pc < len(run.code) and (pc < outside or run.routine is not routine):
@@ -265,7 +265,7 @@ class ProgramFlow(Calls):
             return self._call(pc, item, said)
         elif kind == StatementKind.LABEL and isinstance(said, bytes):
             self._label(pc, item, said)
-            self._comment_behind(item)
+            self._comment_after(item)
         elif kind == StatementKind.GOTO and isinstance(said, bytes):
             there = self._goto(pc, said)
             if 0 < there <= pc:
@@ -275,7 +275,7 @@ class ProgramFlow(Calls):
                     and before.kind == StatementKind.LABEL
                     and before.strings == said
                 ):
-                    self._comment_behind(before)  # what its line states is passed again
+                    self._comment_after(before)  # what its line states is passed again
             return there
         elif kind == StatementKind.EXIT:
             return self._exit(pc)
@@ -338,13 +338,13 @@ class ProgramFlow(Calls):
                 there = self._branch(pc, block)
                 if there is None:  # the branch before it is the one that runs
                     return block.end
-                self._comment_behind(item)
+                self._comment_after(item)
                 return there
             again = self._close(item, block)
             if again is not None:
                 return again
             if block.word not in SPLINES:
-                self._comment_behind(item)
+                self._comment_after(item)
         return None
 
     def _pass_over(self, pc: int, item: Item) -> int | None:
@@ -356,7 +356,7 @@ class ProgramFlow(Calls):
             return pc + 1 if there is None else there
         if item.kind == StatementKind.LABEL and isinstance(item.strings, bytes):
             self._label(pc, item, item.strings)
-            self._comment_behind(item)
+            self._comment_after(item)
         elif item.kind == StatementKind.END:
             return self._leave(pc)
         return pc + 1
@@ -368,7 +368,7 @@ class ProgramFlow(Calls):
             for what, block in self.run.structure.events.get(pc, ())
         )
 
-    def _comment_behind(self, item: Statement) -> None:
+    def _comment_after(self, item: Statement) -> None:
         """Takes up the comment of such a line, if a path leads on from it."""
         if item.comment and self.reachable:
             self._comment(item)
