@@ -219,7 +219,7 @@ class ProgramFlow(Calls):
         if isinstance(item, VectorisedLines):
             motions.move_bulk(run, item)
             return pc + 1
-        if item.comment and not self._is_behind(pc, item):
+        if item.comment and not self._counts_after(pc, item):
             self._comment(item)
         if run.walked and run.structure.aliases:
             self._forget_aliases(item)
@@ -361,7 +361,7 @@ class ProgramFlow(Calls):
             return self._leave(pc)
         return pc + 1
 
-    def _is_behind(self, pc: int, item: Statement) -> bool:
+    def _counts_after(self, pc: int, item: Statement) -> bool:
         """Whether the comment of a line counts where paths go on: behind a label, or a line of a block."""
         return item.kind == StatementKind.LABEL or any(
             block.word not in SPLINES and (what != StatementKind.OPEN or block.word != b"SWITCH")
