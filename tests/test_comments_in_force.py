@@ -13,6 +13,7 @@ OFF, ONE, SAME, TWO = (
     for line, text in enumerate(("FORCE OFF", "FORCE 1 0 0", "force  1 0 0", "FORCE 2 0 0"))
 )
 EVERY = (None, OFF, ONE, TWO, VARYING)
+ON = CommentInForce.of("compensate  on", 9)
 
 
 def test_the_join_of_paths_is_a_lattice() -> None:
@@ -27,7 +28,7 @@ def test_the_join_of_paths_is_a_lattice() -> None:
     ("one", "other", "joined"),
     [
         (None, OFF, None), (None, ONE, VARYING), (ONE, SAME, ONE), (ONE, TWO, VARYING), (OFF, ONE, VARYING),
-        (OFF, VARYING, VARYING),
+        (OFF, VARYING, VARYING), (None, ON, None), (ON, CommentInForce.of("COMPENSATE OFF", 10), VARYING),
     ],
 )  # fmt: skip
 def test_what_is_in_force_where_two_paths_meet(one, other, joined) -> None:

@@ -114,3 +114,45 @@ def test_a_comment_at_a_label_is_passed_again_by_jumps_back(last):
     text = f"{HEAD}on: ;FORCE 1 0 0\n{LINE.format(1)};{last}\nIF $IN[1] THEN\nGOTO on\nENDIF\nEND\n"
     assert read(text)[0] == [(5, "FORCE 1 0 0")]
     assert read(text.replace("IF $IN[1] THEN\n", "").replace("ENDIF\n", ""))[0] == [(5, "FORCE 1 0 0")]
+
+
+@pytest.mark.parametrize("condition", ["$IN[1]", "TRUE", "FALSE"])
+def test_a_comment_behind_then_counts_in_that_branch_alone(condition):
+    branches = f"IF {condition} THEN ;FORCE 2 0 0\n{LINE.format(1)}ELSE\n{LINE.format(2)}ENDIF\n"
+    rows = dict(read(f"{HEAD};FORCE 1 0 0\n{branches}END\n")[0])
+    if condition != "FALSE":
+        assert rows[6] == "FORCE 2 0 0"
+    if condition != "TRUE":
+        assert rows[8] == "FORCE 1 0 0"
+
+
+@pytest.mark.parametrize(
+    ("opens", "closes"),
+    [
+        ("FOR N=1 TO 2", "ENDFOR"), ("FOR N=1 TO $ANIN[1]", "ENDFOR"), ("N=0\nWHILE N<2", "N=N+1\nENDWHILE"),
+        ("WHILE $IN[1]", "ENDWHILE"), ("N=0\nREPEAT", "N=N+1\nUNTIL N==2"), ("REPEAT", "UNTIL $IN[1]"),
+        ("N=0\nLOOP", "N=N+1\nIF N==2 THEN\nEXIT\nENDIF\nENDLOOP"),
+        ("LOOP", "IF $IN[1] THEN\nEXIT\nENDIF\nENDLOOP"),
+    ],
+)  # fmt: skip
+def test_a_comment_on_the_first_line_of_a_loop_counts_in_each_pass(opens, closes):
+    loop = f"{opens} ;FORCE 2 0 0\n{LINE.format(1)};FORCE OFF\n{closes} ;FORCE 3 0 0\n{LINE.format(2)}"
+    rows, _ = read(f"DEF part()\nINT N\n{HEAD.partition(chr(10))[2]};FORCE 1 0 0\n{loop}END\n")
+    assert {force for _, force in rows[:-1]} == {"FORCE 2 0 0"}
+    assert rows[-1][1] == "FORCE 3 0 0"
+
+
+@pytest.mark.parametrize("loop", ["FOR N=2 TO 1\nENDFOR", "WHILE FALSE\nENDWHILE"])
+def test_a_comment_on_the_first_line_of_a_loop_that_never_runs(loop):
+    first, end = loop.split("\n")
+    text = f"{HEAD};FORCE 1 0 0\n{first} ;FORCE 2 0 0\n{LINE.format(1)}{end}\n{LINE.format(2)}END\n"
+    assert dict(read(text)[0])[8] == "FORCE 1 0 0"
+
+
+def test_a_comment_on_the_first_line_of_a_routine_counts_in_it():
+    first, rest = HEAD.split("\n", 1)
+    text = f"{first} ;FORCE 1 0 0\n{rest}{LINE.format(1)}sub()\n{LINE.format(2)}END\n"
+    text += f"DEF sub() ;FORCE 2 0 0\n{LINE.format(3)}END\n"
+    forces = {1: "FORCE 1 0 0", 3: "FORCE 2 0 0", 2: "FORCE 2 0 0"}
+    lines = {line: n for n in forces for line, words in enumerate(text.split("\n"), 1) if f"{{X {n}" in words}
+    assert {lines[line]: force for line, force in read(text)[0]} == forces

@@ -356,3 +356,39 @@ def test_a_component_that_is_assigned_has_its_own_place() -> None:
 
 def test_a_target_of_the_text_is_a_value() -> None:
     assert isinstance(evaluate(b"{X 1,Y 2}", lambda name, path: None), KrlTarget)
+
+
+RECORDS = (
+    "DECL E6POS XP1={X 1,Y 2,Z 3,A 0,B 0,C 0}\nDECL FDAT FP1={TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE}\n"
+    "DECL LDAT LP1={VEL 0.5,APO_DIST 10.0}\n"
+)
+
+
+@pytest.mark.parametrize(
+    "change", ["", "FP1.BASE_NO=4\n", "FP1.TOOL_NO=N\n", "FP1=FP2\n", "FP1.IPO_FRAME=#TCP\n"]
+)
+def test_an_fdat_that_the_program_changes_is_not_what_its_file_states(change: str) -> None:
+    program = body(f"{change}FDAT_ACT=FP1\nBAS(#FRAMES)\nLIN XP1\n", RECORDS)
+    assert codes(program) == ({0: "KRL005"} if change else {})
+
+
+@pytest.mark.parametrize("change", ["", "LP1.VEL=1.5\nLP1.APO_DIST=20\n", "LP1={VEL 1.5,APO_DIST 20}\n"])
+@pytest.mark.parametrize("use", ["LDAT_ACT=LP1\nBAS(#CP_PARAMS)", "$VEL.CP=SVEL_CP(0,0,LP1)\n$APO=SAPO(LP1)"])
+def test_an_ldat_that_the_program_changes_is_not_what_its_file_states(change: str, use: str) -> None:
+    path = body(f"FDAT_ACT=FP1\nBAS(#FRAMES)\n{change}{use}\nLIN XP1 C_DIS\n", RECORDS).toolpath
+    assert np.isfinite([path.feed[0], path.approximation[0]]).all() == (not change)
+
+
+@pytest.mark.parametrize(
+    ("value", "known"), [("2147483647", True), ("2147483647+1", False), ("50000*50000", False)]
+)
+def test_an_int_that_overflows_has_no_value(value: str, known: bool) -> None:
+    assert isinstance(evaluate(value.encode(), lambda name, path: None), UnknownValue) == (not known)
+
+
+@pytest.mark.parametrize(("declared", "known"), [("DECL POS P\n", True), ("", False)])
+def test_what_an_aggregate_omits_may_have_a_value_in_a_variable_of_another_file(
+    declared: str, known: bool
+) -> None:
+    path = body(f"{declared}{FULL}P={{X 7}}\nLIN P\n").toolpath
+    assert np.isfinite(path.position[1]).all() == known

@@ -52,5 +52,11 @@ def test_it_is_not_claimed(name: str) -> None:
     assert refused(*UNKNOWN[name])[0]
 
 
+@pytest.mark.parametrize("displaces", ["PDispOn\\Rot,p1,t1", "PDispOn\\ExeP:=p1,p1,t1\\WObj:=w1"])
+def test_what_displaces_motions_changes_none_of_its_arguments(displaces: str) -> None:
+    data = f"VAR robtarget p1:={POINT.replace('n1', '3')};\nPROC touch()\nPDispOff;\nENDPROC"
+    assert refused(f"{displaces};\n{MOVE}\nPDispOff;\ntouch;\nn1:=2;\n{MOVE}", data) == [True, False]
+
+
 def test_what_is_a_constant_is_claimed() -> None:
     assert refused(f"n1:=2;\nIF NOT (a AND b) n1:=5;\n{MOVE}\nIF NOT n1=2 n1:=6;\n{MOVE}") == [False, False]

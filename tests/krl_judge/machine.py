@@ -302,7 +302,8 @@ class Machine(Events):
         """Executes the statement ``at``; the place of the next one."""
         reader = line.reader()
         word = line.word
-        self.continued = at > 0 and scope.routine.lines[at - 1].word == "CONTINUE"
+        before = next((one.word for one in scope.routine.lines[:at][::-1] if one.word != ";force"), "")
+        self.continued = before == "CONTINUE"
         following = line.tokens[1][1] if len(line.tokens) > 1 else ""
         if word == ";label":
             return at + 1

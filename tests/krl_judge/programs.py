@@ -217,7 +217,13 @@ class Generator(Further):
             ]
         else:
             inner = [f"PDAT_ACT=PPDAT{n}", f"FDAT_ACT=FP{n}", "BAS(#PTP_PARAMS,100)", f"PTP {point}"]
-        return [f";FOLD {inner[-1]} Vel=1 m/s", "$BWDSTART=FALSE", *inner, ";ENDFOLD"]
+        changes = [
+            f"FP{n}.{rng.choice(['BASE_NO', 'TOOL_NO'])}={rng.randint(1, 4)}",
+            f"LCPDAT{n}.{rng.choice(['VEL', 'APO_DIST'])}={rng.randint(1, 3)}",
+            f"FP{n}=FP{3 - n}",
+        ]
+        before = [rng.choice(changes)] if rng.random() < 0.1 else []
+        return [*before, f";FOLD {inner[-1]} Vel=1 m/s", "$BWDSTART=FALSE", *inner, ";ENDFOLD"]
 
     def idle(self) -> list[str]:
         n = self.rng.choice(INPUTS)
@@ -533,13 +539,13 @@ def with_forces(lines: list[str], rng: random.Random) -> list[str]:
         return lines
     share, out = rng.choice([0.02, 0.06, 0.2]), [""]
     for line, following in pairwise([*lines, "END"]):
-        word = line.partition(" ")[0]
-        inside = not line.startswith("&") and word not in ("END", "ENDFCT", "CONTINUE", "SWITCH", "GLOBAL")
+        inside = not line.startswith("&")
         text = rng.choice([f";FORCE {rng.randint(1, 3)} 0 0", ";FORCE OFF"])
-        bare = not line.startswith(";") and line and word not in ("DEF", "DEFFCT") and out[-1] != "CONTINUE"
+        bare = line and not line.startswith(";")
         if inside and bare and rng.random() < share:
             line += " " + text
         out.append(line)
-        if inside and not following.startswith(("DEF ", "DEFFCT")) and rng.random() < share:
+        outside = line in ("END", "ENDFCT") or following.startswith(("DEF ", "DEFFCT", "GLOBAL DEF"))
+        if inside and not outside and not line.startswith("SWITCH ") and rng.random() < share:
             out.append(text)
     return out[1:]

@@ -16,8 +16,6 @@ _TOKEN = re.compile(
 
 
 _FORCE = re.compile(r"""(?:[^";]|"[^"]*")*;[ \t]*FORCE[ \t]+(.*?)[ \t]*\Z""", re.I)
-_BEHIND = ("ELSE", "CASE", "DEFAULT", "ENDIF", "ENDSWITCH")
-"""Words of lines whose comment counts where paths go on behind them; that of any other line counts in it."""
 
 
 def tokens(line: str) -> list[tuple[str, str]]:
@@ -189,6 +187,8 @@ OPENS = {
     "REPEAT": "UNTIL",
 }
 CLOSES = {end: start for start, end in OPENS.items()}
+_BEHIND = {*OPENS, *CLOSES, "ELSE", "CASE", "DEFAULT"} - {"SWITCH"}
+"""Words of lines whose comment counts where paths go on behind them; that of any other line counts in it."""
 LOOPS = ("FOR", "WHILE", "LOOP", "REPEAT")
 
 
@@ -229,10 +229,7 @@ def routines(text: str) -> list[Routine]:
         if line.lstrip().startswith("&") and not out:
             continue
         found = tokens(line)
-        said = _FORCE.match(line) if open_ else None
-        force = (
-            [] if said is None else [Line(number, [("name", ";force"), ("text", " ".join(said[1].split()))])]
-        )
+        force = _force(number, _FORCE.match(line) if open_ else None)
         if not found:
             if force:
                 out[-1].lines += force
@@ -244,10 +241,12 @@ def routines(text: str) -> list[Routine]:
             if open_:
                 raise Stop("a routine in a routine")
             out.append(_header(found))
+            out[-1].lines += _force(number, _FORCE.match(line))
             open_ = True
         elif words in (["END"], ["ENDFCT"]):
             if not open_ or (words == ["ENDFCT"]) != bool(out[-1].result):
                 raise Stop("an end without a begin")
+            out[-1].lines += force
             open_ = False
         elif not open_:
             raise Stop("a statement outside of routines")
@@ -256,7 +255,7 @@ def routines(text: str) -> list[Routine]:
                 raise Stop("a label twice")
             out[-1].labels[words[0]] = len(out[-1].lines)
             out[-1].lines += [Line(number, [("name", ";label")]), *force]
-        elif words[0] in _BEHIND:
+        elif words[0] in _BEHIND and words[1:2] not in (["="], ["["], ["."]):
             out[-1].lines += [Line(number, found), *force]
         else:
             out[-1].lines += [*force, Line(number, found)]
@@ -267,6 +266,10 @@ def routines(text: str) -> list[Routine]:
     if len({routine.name for routine in out}) < len(out):
         raise Stop("a routine twice")
     return out
+
+
+def _force(number: int, said: re.Match | None) -> list[Line]:
+    return [] if said is None else [Line(number, [("name", ";force"), ("text", " ".join(said[1].split()))])]
 
 
 def _header(found: list) -> Routine:

@@ -433,7 +433,7 @@ class Machine:
                 raise Fault
         elif word == "isignaldi":
             self.armed = True
-        elif word in ("pdispset", "eoffsset", "softact"):
+        elif word in ("pdispset", "pdispon", "eoffsset", "eoffson", "softact"):
             self.displaced |= {word[:4]}
         elif word in ("pdispoff", "eoffsoff", "softdeact"):
             self.displaced -= {word[:4]}

@@ -12,6 +12,7 @@ SPEAKS = re.compile(r"(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
 """What a comment starts with that speaks to this tool."""
 CONTRADICTED = "the FORCE or COMPENSATE comment in force differs with the path of the program"
 _PLACES = {"FORCE": "force", "COMPENSATE": "switch"}
+_INITIAL = ("FORCE OFF", "COMPENSATE ON")
 _WORD = re.compile(r"[^ \t,]*")
 
 
@@ -51,14 +52,15 @@ def _statement(text: str) -> str:
     return " ".join(text.upper().split())
 
 
-def is_off(comment: Comment | Varying | None) -> bool:
-    return comment is not None and comment is not VARYING and _statement(comment.text) == "FORCE OFF"
+def is_initial(comment: Comment | Varying | None) -> bool:
+    """Whether a comment states what is so before the first one: no force acts, and motions are corrected."""
+    return comment is not None and comment is not VARYING and _statement(comment.text) in _INITIAL
 
 
 def join_comments(one: Comment | Varying | None, other: Comment | Varying | None) -> Comment | Varying | None:
-    """What is in force where two paths meet; before the first comment no force acts, as under FORCE OFF."""
+    """What is in force where two paths meet; before the first comment all is as under FORCE OFF and COMPENSATE ON."""
     if one is None or other is None:
-        return None if one is other or is_off(one) or is_off(other) else VARYING
+        return None if one is other or is_initial(one) or is_initial(other) else VARYING
     if one is VARYING or other is VARYING or _statement(one.text) != _statement(other.text):
         return VARYING
     return one
@@ -85,5 +87,5 @@ class ShownComments:
     def others(self, force: object, switch: object) -> Iterator[tuple[str, object]]:
         """The words of which another comment, or none, is in force at the next row, and that comment."""
         for word, said in (("FORCE", force), ("COMPENSATE", switch)):
-            if said is not self._last[word] and not (said is None and is_off(self._last[word])):
+            if said is not self._last[word] and not (said is None and is_initial(self._last[word])):
                 yield word, said

@@ -301,8 +301,7 @@ def _record(run: ExecutionContext, assignment: Assignment, before: Record | None
         return None if before is None else {**before, assignment.path: value}
     if value.startswith(b"{"):
         return fields(value)
-    name = value.upper()
-    return None if name in run.structure.assigned else run.record(name)
+    return run.record(value.upper())
 
 
 _NAME = b""
@@ -313,7 +312,8 @@ def _frames_record(run: ExecutionContext, assignment: Assignment, before: Record
     """The same of FDAT_ACT; {_NAME: name} where a record that no file declares is assigned."""
     record = _record(run, assignment, None if before is None or _NAME in before else before)
     name = assignment.value.strip().upper()
-    if record is None and not assignment.path and _SIMPLE.match(name) and name not in run.structure.assigned:
+    changed = name in run.structure.assigned or name in run.partly_assigned
+    if record is None and not assignment.path and _SIMPLE.match(name) and not changed:
         return {_NAME: name}
     return record
 
@@ -321,18 +321,19 @@ def _frames_record(run: ExecutionContext, assignment: Assignment, before: Record
 def _of_record(run: ExecutionContext, text: bytes) -> bytes | None:
     """The entry that ``FP1.BASE_NO`` names."""
     name, _, key = text.strip().upper().partition(b".")
-    record = run.record(name)
-    if record is None or name in run.structure.assigned or name + b"." + key in run.structure.assigned:
-        return None
-    return record.get(key)
+    record = run.record(name, key)
+    return None if record is None else record.get(key)
 
 
 def _apply_record(run: ExecutionContext, statement: Statement) -> None:
     state, record = run.state, run.state.frames_record
     if record is None or _NAME in record:
         run.variables.asked.add(b"FDAT_ACT")
-        name = "" if record is None else f" {record[_NAME].decode('latin-1')}"
-        why = f"since line {statement.line}: its FDAT{name} is declared elsewhere"
+        unknown = (
+            "is not known" if record is None else f"{record[_NAME].decode('latin-1')} is declared elsewhere"
+        )
+        why = f"since line {statement.line}: its FDAT {unknown}"
+        state.forget({"mode"}, why, run.has_tcp_mode, run.has_turning)
         state.base = UnknownValue("KRL005", f"$BASE is not known {why}")
         state.tool = UnknownValue("KRL005", f"$TOOL is not known {why}")
         return
@@ -352,7 +353,8 @@ def _set_variable(run: ExecutionContext, assignment: Assignment) -> None:
         path = b"[" + indices + b"]"
     if not assignment.path:
         value = _value(run, assignment.value.rstrip(), assignment.at)
-        if isinstance(value, KrlTarget) and value.missing and run.variables.get(name, path) is not None:
+        has_value = run.variables.get(name, path) is not None or not run.trusted(name)
+        if isinstance(value, KrlTarget) and value.missing and has_value:
             missing = value.missing
             value = UnknownValue("KRL002", f"the aggregate assigned to {shown(name)} omits {missing}")
         keep(run, name, path, value)

@@ -73,6 +73,7 @@ class BlockFlow(OpenBlocks):
                 self._continue_with(self._forgotten(run.flow(), block))
             frame.before = self._here()
             run.opaque = run.opaque or block
+            self._comment_after(item)
             return pc + 1
         if block.word in (b"IF", b"SWITCH"):
             return self._open_branches(pc, item, block)
@@ -101,15 +102,17 @@ class BlockFlow(OpenBlocks):
         chosen = self._chosen(pc, item, block) if self.reachable else None
         frame = self._push(block, chosen is not None)
         if chosen is not None and not block.has_labels:
-            if chosen in block.branches and self._item(chosen).comment:
-                self._comment(self._item(chosen))  # its line is jumped over
-            return chosen if chosen == block.end else chosen + 1
+            if chosen == block.end:
+                return chosen
+            self._comment_after(self._item(chosen))
+            return chosen + 1
         is_if = block.word == b"IF"
         frame.chosen = chosen
         others = any(is_if or self._item(at).word == b"DEFAULT" for at in block.branches)
         frame.falls_through = chosen == block.end if chosen is not None else not others
         if not is_if or chosen not in (None, pc):
             self.reachable = False
+        self._comment_after(item)
         return pc + 1
 
     def _chosen(self, pc: int, item: Statement, block: Block) -> int | None:
@@ -163,13 +166,19 @@ class BlockFlow(OpenBlocks):
             ):
                 return None
             if not value:
-                return block.end + 1
+                return self._after_loop(block)
         if word == b"LOOP" and not block.leaves:
             return None
         if word == b"REPEAT" and not self._can_be_decided(block):
             return None
         self._push(block, True)
+        self._comment_after(item)
         return pc + 1
+
+    def _after_loop(self, block: Block) -> int:
+        """Where it goes on behind a loop that ends without its last line."""
+        self._comment_after(self._item(block.end))
+        return block.end + 1
 
     def _can_be_decided(self, block: Block) -> bool:
         """Whether the condition of an UNTIL is a constant before its loop, or the loop may make it one."""
@@ -203,8 +212,9 @@ class BlockFlow(OpenBlocks):
         if (last - first) * step < 0:
             self._pop()
             run.variables.set(name, b"", AFTER_FOR)
-            return block.end + 1
+            return self._after_loop(block)
         frame.counter = (name, first, last, step)
+        self._comment_after(item)
         return pc + 1
 
     def _enter_pass(self, frame: BlockFrame, item: Statement) -> int:
@@ -237,6 +247,7 @@ class BlockFlow(OpenBlocks):
                 known = all(isinstance(value, int) for value in (first, last, step))
                 if not (known and (last - first) * step >= 0):  # type: ignore[operator]
                     frame.exits = run.flow()
+        self._comment_after(item)
         return block.start + 1
 
     def _branch(self, pc: int, block: Block) -> int | None:
@@ -284,6 +295,7 @@ class BlockFlow(OpenBlocks):
             run.variables.set(name, b"", value)
             if (last - value) * step >= 0:
                 frame.counter = (name, value, last, step)
+                self._comment_after(self._item(block.start))
                 return block.start + 1
             self._leave_loop(frame)
             run.variables.set(name, b"", AFTER_FOR)
@@ -292,6 +304,7 @@ class BlockFlow(OpenBlocks):
             if again is None:
                 return self._abort(frame)
             if again:
+                self._comment_after(self._item(block.start))
                 return block.start + 1
             self._leave_loop(frame)
         return None
@@ -353,8 +366,8 @@ class BlockFlow(OpenBlocks):
         return None
 
     @abstractmethod
-    def _comment(self, item: Statement) -> None:
-        """Takes up the comment of a line."""
+    def _comment_after(self, item: Statement) -> None:
+        """Takes up the comment of a line behind whose statement paths go on, if one does."""
 
     @abstractmethod
     def _call_functions(self, item: Statement) -> None:

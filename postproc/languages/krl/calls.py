@@ -170,7 +170,7 @@ class Calls(BlockFlow):
                 while self.stack[-1] is not loop:
                     self._pop()
                 self._pop()
-                return loop.block.end + 1
+                return self._after_loop(loop.block)
             if loop.block.word != b"FOR":
                 return self._abort(loop)
         loop.exits = run.merged(loop.exits, run.flow())
@@ -327,6 +327,7 @@ class Calls(BlockFlow):
             for name in names
         )
         run.followed[routine.name] = None
+        self._comment_after(self._item(routine.start))
         return routine.start + 1
 
     def _call_functions(self, item: Statement) -> None:

@@ -9,7 +9,7 @@ from postproc.languages.core.comments_in_force import (
     VARYING,
     CommentInForce,
     InForce,
-    is_off,
+    is_initial,
     place_of,
 )
 from postproc.languages.krl.motion_rows import MotionRows, RowRefusal
@@ -39,7 +39,11 @@ def take_comments(rows: MotionRows) -> tuple[Annotation, ...]:
             elif isinstance(comment, CommentInForce) and comment != last[name]:
                 found.append(Annotation(row, comment.text, comment.line))
                 last[name] = comment
-            elif comment is None and last[name] is not None and not is_off(last[name]):
-                message = f"no {_WORDS[name]} comment is in force, after motions with one"
+            elif (
+                comment is None
+                and isinstance(before := last[name], CommentInForce)
+                and not is_initial(before)
+            ):
+                message = f"no {_WORDS[name]} comment is in force: no path leads here from that in line {before.line}"
                 rows.ranges.append((row, end, RowRefusal("KRL036", message, f"no {name}")))
     return (*found, *([] if following is None else [following]), *passed)

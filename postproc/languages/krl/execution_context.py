@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 from postproc.base.document import Document
@@ -207,10 +208,16 @@ class ExecutionContext:
             return UnknownValue(value.code, value.message)
         return value
 
-    def record(self, name: bytes) -> Record | None:
-        """The entries of an FDAT, LDAT or PDAT as it is declared."""
+    def record(self, name: bytes, key: bytes = b"") -> Record | None:
+        """The entries of an FDAT, LDAT or PDAT as it is declared; None where the program changes it, or its ``key``."""
         self.variables.asked.add(name)
-        return self.declarations.records.get(name)
+        partly = name + b"." + key in self.structure.assigned if key else name in self.partly_assigned
+        return None if partly or name in self.structure.assigned else self.declarations.records.get(name)
+
+    @cached_property
+    def partly_assigned(self) -> frozenset[bytes]:
+        """Names of which the program assigns a component."""
+        return frozenset(name.partition(b".")[0] for name in self.structure.assigned if b"." in name)
 
     def value(self, text: bytes) -> Value:
         """The value of an expression in the program."""

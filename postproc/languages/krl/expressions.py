@@ -66,8 +66,8 @@ _FUNCTIONS: dict[bytes, Callable[..., float]] = {
 _SYSTEM = {b"TRUE": True, b"FALSE": False}
 _WORDS = frozenset([*_SYSTEM, b"NOT", b"B_NOT"])
 """Names that are no variables where an operand is expected."""
-_MOST = 2**62
-"""A product of whole numbers beyond overflows."""
+_MOST = 2**31 - 1
+"""An INT has 32 bits: what exceeds it overflows."""
 
 
 class UntypedNumber(float):
@@ -226,7 +226,7 @@ class _Parser:
             self._next()
             right = self._product(depth)
             a, b = self._number(left), self._number(right)
-            left = _of_type(a + b if operator == b"+" else a - b, a, b)
+            left = self._within(_of_type(a + b if operator == b"+" else a - b, a, b))
         return left
 
     def _product(self, depth: int) -> Value:
@@ -243,9 +243,13 @@ class _Parser:
                 left = abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)  # whole numbers stay whole
             else:
                 left = a / b
-            if isinstance(left, int) and abs(left) > _MOST:
-                raise self._unknown("it overflows")
+            left = self._within(left)
         return left
+
+    def _within(self, value: Value) -> Value:
+        if isinstance(value, int) and abs(value) > _MOST:
+            raise self._unknown("it overflows")
+        return value
 
     def _unary(self, depth: int) -> Value:
         signs = negative = 0

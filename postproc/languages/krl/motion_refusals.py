@@ -16,11 +16,11 @@ def frames_missing(run: ExecutionContext) -> RowRefusal | None:
     if state.later_since:
         what = f"the interrupt or trigger of line {state.later_since} may change base or tool at any time"
         return RowRefusal("KRL005", what, "later")
-    if state.tool_known:
-        return RowRefusal("KRL013", "the tool is fixed in the world ($IPO_MODE=#TCP)", "tcp")
     for frame in (state.base, state.tool):
         if isinstance(frame, UnknownValue):
             return refusal(frame, "", frame.message)
+    if state.tool_known:
+        return RowRefusal("KRL013", "the tool is fixed in the world ($IPO_MODE=#TCP)", "tcp")
     return None
 
 

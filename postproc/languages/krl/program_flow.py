@@ -18,6 +18,7 @@ from postproc.languages.krl.external_axes import by_themselves
 from postproc.languages.krl.flow_frames import Restart, Unfollowed
 from postproc.languages.krl.later_changes import EVENTS, later_actions, later_functions
 from postproc.languages.krl.lexing import (
+    SPLINES,
     Assignment,
     Call,
     Declared,
@@ -62,7 +63,6 @@ from postproc.languages.krl.vectorised import Item, VectorisedLines
 from postproc.toolpath import Annotation
 from postproc.toolpath.meant_comments import meant_to_speak
 
-BRANCHING = (b"IF", b"SWITCH")
 _WAITS = tuple(Waits)
 
 
@@ -104,6 +104,7 @@ class ProgramFlow(Calls):
         for i, (name, _) in enumerate(routine.parameters):
             value = args[i] if i < len(args) else None
             run.variables.replace(name, {} if value is None else {b"": run.converted(name, value)})
+        self._comment_after(self._item(routine.start))
         pc: int | None = routine.start + 1
         while pc is not None and pc < len(run.code):
             pc = self._step(pc)
@@ -137,6 +138,7 @@ class ProgramFlow(Calls):
 
     def _run(self, routine: Routine) -> None:
         run = self.run
+        self._comment_after(self._item(routine.start))
         pc: int | None = routine.start + 1
         outside = routine.end + 1 if run.structure.has_routine else len(run.code)
         while pc is not None and pc < len(run.code) and (pc < outside or run.routine is not routine):
@@ -217,7 +219,7 @@ class ProgramFlow(Calls):
         if isinstance(item, VectorisedLines):
             motions.move_bulk(run, item)
             return pc + 1
-        if item.comment and not self._is_behind(pc, item):
+        if item.comment and not self._counts_after(pc, item):
             self._comment(item)
         if run.walked and run.structure.aliases:
             self._forget_aliases(item)
@@ -263,7 +265,7 @@ class ProgramFlow(Calls):
             return self._call(pc, item, said)
         elif kind == StatementKind.LABEL and isinstance(said, bytes):
             self._label(pc, item, said)
-            self._comment_behind(item)
+            self._comment_after(item)
         elif kind == StatementKind.GOTO and isinstance(said, bytes):
             there = self._goto(pc, said)
             if 0 < there <= pc:
@@ -273,7 +275,7 @@ class ProgramFlow(Calls):
                     and before.kind == StatementKind.LABEL
                     and before.strings == said
                 ):
-                    self._comment_behind(before)  # what its line states is passed again
+                    self._comment_after(before)  # what its line states is passed again
             return there
         elif kind == StatementKind.EXIT:
             return self._exit(pc)
@@ -336,13 +338,13 @@ class ProgramFlow(Calls):
                 there = self._branch(pc, block)
                 if there is None:  # the branch before it is the one that runs
                     return block.end
-                self._comment_behind(item)
+                self._comment_after(item)
                 return there
             again = self._close(item, block)
             if again is not None:
                 return again
-            if block.word in BRANCHING:
-                self._comment_behind(item)
+            if block.word not in SPLINES:
+                self._comment_after(item)
         return None
 
     def _pass_over(self, pc: int, item: Item) -> int | None:
@@ -354,19 +356,19 @@ class ProgramFlow(Calls):
             return pc + 1 if there is None else there
         if item.kind == StatementKind.LABEL and isinstance(item.strings, bytes):
             self._label(pc, item, item.strings)
-            self._comment_behind(item)
+            self._comment_after(item)
         elif item.kind == StatementKind.END:
             return self._leave(pc)
         return pc + 1
 
-    def _is_behind(self, pc: int, item: Statement) -> bool:
-        """Whether the comment of a line counts where paths go on: behind a label, a branch, the end of branches."""
+    def _counts_after(self, pc: int, item: Statement) -> bool:
+        """Whether the comment of a line counts where paths go on: behind a label, or a line of a block."""
         return item.kind == StatementKind.LABEL or any(
-            what == StatementKind.BRANCH or (what == StatementKind.CLOSE and block.word in BRANCHING)
+            block.word not in SPLINES and (what != StatementKind.OPEN or block.word != b"SWITCH")
             for what, block in self.run.structure.events.get(pc, ())
         )
 
-    def _comment_behind(self, item: Statement) -> None:
+    def _comment_after(self, item: Statement) -> None:
         """Takes up the comment of such a line, if a path leads on from it."""
         if item.comment and self.reachable:
             self._comment(item)

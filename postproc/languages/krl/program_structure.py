@@ -117,11 +117,8 @@ class _Surveyor:
 
     def take(self, index: int, statement: Statement) -> None:
         kind, stack = statement.kind, self.stack
-        if statement.comment and ANNOTATION.match(statement.comment):
-            changed = place_of(statement.comment[1:].decode("latin-1").strip())
-            self.found.effects.add(changed)
-            if stack:
-                stack[-1].effects.add(changed)
+        if kind not in (StatementKind.OPEN, StatementKind.DEF):
+            self._note_comment(statement)
         if kind not in (StatementKind.MOTION, StatementKind.COMMENT) and not is_well_formed(statement):
             self._ill_formed(statement)
         if stack and stack[-1].word == b"SWITCH" and not stack[-1].branches:
@@ -137,6 +134,7 @@ class _Surveyor:
             self._fold(statement.comment)
         elif kind == StatementKind.DEF:
             self._routine(index, statement)
+            self._note_comment(statement)  # it is in what is opened
         elif kind == StatementKind.END:
             if not stack or not isinstance(stack[0], Routine):
                 self._close_all(index)
@@ -145,6 +143,7 @@ class _Surveyor:
                 self._close_all(index)
         elif kind == StatementKind.OPEN:
             self._open(index, statement)
+            self._note_comment(statement)
         elif kind == StatementKind.BRANCH:
             self.note(statement)
             if not self.buried and stack and stack[-1].word == BRANCHES[statement.word]:
@@ -169,6 +168,13 @@ class _Surveyor:
             if statement.word == b"ELSEIF" and stack:
                 stack[-1].broken = True  # no KRL, and no end of what is before it
             self.note(statement)
+
+    def _note_comment(self, statement: Statement) -> None:
+        if statement.comment and ANNOTATION.match(statement.comment):
+            changed = place_of(statement.comment[1:].decode("latin-1").strip())
+            self.found.effects.add(changed)
+            if self.stack:
+                self.stack[-1].effects.add(changed)
 
     def _ill_formed(self, statement: Statement) -> None:
         found, code = self.found, statement.code
@@ -326,12 +332,10 @@ class _Surveyor:
             found.handed.add(Handed(later_functions(statement.code), statement.code, is_call=False))
             named |= as_effects(identifiers(statement.code))
         for call in later_actions(statement):
-            is_bas = call.name == b"BAS"
-            named |= (
-                effects_of_bas(call.arguments)
-                if is_bas
-                else {call.name, *returned_by(call, found.directions)}
-            )
+            if call.name == b"BAS":
+                named |= effects_of_bas(call.arguments)
+            else:
+                named |= {call.name, *returned_by(call, found.directions)}
             if call.arguments:
                 found.handed.add(Handed((call.name,), call.arguments, is_call=True))
         found.later |= {effect for effect in named if isinstance(effect, bytes)}
