@@ -7,6 +7,7 @@ import pytest
 from spring_cases import MM, output, spring
 
 from postproc.compensation import corners
+from postproc.compensation.rounded_path import RoundedOutput
 
 ALL = corners.ALWAYS
 
@@ -25,7 +26,7 @@ def test_corners_are_evaluated_roughly_only_where_not_all_of_them_are_evaluated_
     evaluate = corners.evaluate_corners
 
     def counted(
-        rounded: corners.RoundedOutput, motions: np.ndarray, samples: np.ndarray
+        rounded: RoundedOutput, motions: np.ndarray, samples: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         asked[len(samples)] += len(motions)
         return evaluate(rounded, motions, samples)
