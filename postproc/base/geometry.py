@@ -139,7 +139,7 @@ class PoseRows:
 
         def build(rows: Ints) -> Poses:
             if not len(rows):
-                return self.build(rows)
+                return Poses(np.empty((0, 3, 3)), np.empty((0, 3)))
             low, high = int(rows.min()), int(rows.max()) + 1
             run = getattr(last, "run", _Run(0, 0, UNKNOWN))
             if low < run.start or high > run.stop:

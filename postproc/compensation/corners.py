@@ -89,12 +89,14 @@ def compare_corners_at(task: CompensationProblem, division: Subdivision, motion:
         ramp = task.force.ramps.row
         close = np.isin(source, ramp) | np.isin(source + 1, ramp)
     few = np.flatnonzero(~close)
-    compare(few, FEW)
-    # a turn that no word can correct is the same at all of them
-    turns = task.toolpath.constraints.orientation_programmed[source]
-    size = np.fmax(difference / task.tolerance, np.where(turns, angle / task.tolerance_angle, 0.0))
-    close[few] = ~(size[few] <= CLOSE)
-    close[few[np.argsort(-size[few], kind="stable")[:ALWAYS]]] = True
+    if len(few) > ALWAYS:
+        compare(few, FEW)
+        # a turn that no word can correct is the same at all of them
+        turns = task.toolpath.constraints.orientation_programmed[source]
+        size = np.fmax(difference / task.tolerance, np.where(turns, angle / task.tolerance_angle, 0.0))
+        close[few] = ~(size[few] <= CLOSE)
+        few = few[np.argsort(-size[few], kind="stable")[:ALWAYS]]
+    close[few] = True
     compare(np.flatnonzero(close), SAMPLES)
     return Corners(motion, source, distance, unknown, difference, angle)
 
