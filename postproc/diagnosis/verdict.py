@@ -20,6 +20,7 @@ from postproc.diagnosis.held_out import (
 )
 from postproc.diagnosis.imitations import (
     MARGIN,
+    changes_with_posture,
     follows_another_course,
     is_in_another_course,
     laws_on_one_joint,
@@ -85,6 +86,10 @@ CHANCE_OF_JOINT = 0.05
 NOT_ENOUGH = "too much would remain for a name"
 AS_WELL = "another course over the same joint explains as much, and more remains than scatter"
 OTHER_COURSE = "the readings follow another course than that of this effect"
+OTHER_SIZES = "it would have to be of another size at other angles of the other joints"
+FORMLESS = (OTHER_COURSE, OTHER_SIZES)
+"""Reasons that say that what is missing has no form that is known."""
+
 PART_OF_COURSE = "what it would explain is a part of that other course"
 TWO_LAWS = "it fits only beside another law of lost motion on the same joint, and more remains than scatter"
 ONLY_TOGETHER = "it fits only beside an effect that the readings cannot distinguish from others"
@@ -164,6 +169,8 @@ def judge(search: Search) -> Verdict:
         several = ambiguity_set(search, g, not bounded and _is_observable(candidate, estimates))
         if follows_another_course(search, candidate, -MARGIN):
             rejected.append((candidate, OTHER_COURSE))
+        elif changes_with_posture(search, last, g):
+            rejected.append((candidate, OTHER_SIZES))
         elif (
             unexplained
             and candidate.name not in HAS_DECOYS
@@ -198,7 +205,7 @@ def judge(search: Search) -> Verdict:
         named, aliases = [named[k] for k in kept], [aliases[k] for k in kept]
         groups = [groups[k] for k in kept]
         sets = tuple(a for a in aliases if len({(c.name, c.joint) for c in a}) > 1)
-    formless = any(why == OTHER_COURSE for _, why in rejected)
+    formless = any(why in FORMLESS for _, why in rejected)
     if formless:
         # a zero of the joint that follows another course may be a part of that course
         kept = [k for k, g in enumerate(groups) if not is_in_another_course(search, last, g)]
