@@ -21,9 +21,13 @@ from postproc.diagnosis.selection import (
     residual_of,
     scatter,
 )
+from postproc.identification.fit import Estimate
 
 MARGIN = 10.0
 """By how much -2 ln(likelihood) of the nearest other explanation must be worse: odds of 150 to 1."""
+
+UNUSUAL = 3.0
+"""Usual sizes from which on a parameter has to be determined well to be believed."""
 
 CHANGES = 0.1
 """Share of what an effect explains that its change with another joint must explain to be no small inexactness."""
@@ -102,3 +106,17 @@ def laws_on_one_joint(several: Sequence[Candidate]) -> list[Candidate]:
     like a third."""
     lost = [c for c in several if c.effect.by_direction]
     return [c for c in lost if sum(c.joint == other.joint for other in lost) > 1]
+
+
+def is_implausible(estimates: Sequence[Estimate]) -> bool:
+    """Whether all that was found is beyond plausible sizes, with intervals of more than half of it: past the load at
+    which a tooth changes sides, say, readings do not determine how wide its gap is."""
+    sizes = [(abs(e.value - e.unknown.parameter.null), e.unknown.parameter.scale, e.ci95) for e in estimates]
+    return bool(sizes) and all(size > UNUSUAL * scale and wide > 0.5 * size for size, scale, wide in sizes)
+
+
+def is_out_of_bounds(estimate: Estimate) -> bool:
+    """Whether the readings ask for more than the bound of a parameter, far beyond its usual size."""
+    parameter = estimate.unknown.parameter
+    away = abs(estimate.value - parameter.null)
+    return estimate.at_bound and not parameter.hardware and away > UNUSUAL * parameter.scale

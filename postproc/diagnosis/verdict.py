@@ -22,7 +22,9 @@ from postproc.diagnosis.imitations import (
     MARGIN,
     changes_with_posture,
     follows_another_course,
+    is_implausible,
     is_in_another_course,
+    is_out_of_bounds,
     laws_on_one_joint,
 )
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
@@ -47,9 +49,6 @@ CLEAR, THERE = 1.5, 1.0
 BUILT = 4.6
 """By how much -2 ln(likelihood) of what is no such thing must be better to question hardware that the robot file
 describes: odds of 10 to 1."""
-
-UNUSUAL = 3.0
-"""Usual sizes from which on a parameter has to be determined well to be believed."""
 
 EXCESS = 3.0
 """Standard deviations of its own by which the remaining variance must exceed the stated one to be a lack of fit."""
@@ -87,6 +86,7 @@ NOT_ENOUGH = "too much would remain for a name"
 AS_WELL = "another course over the same joint explains as much, and more remains than scatter"
 OTHER_COURSE = "the readings follow another course than that of this effect"
 OTHER_SIZES = "it would have to be of another size at other angles of the other joints"
+AT_BOUNDS = "its parameters would have to lie at their bounds"
 FORMLESS = (OTHER_COURSE, OTHER_SIZES)
 """Reasons that say that what is missing has no form that is known."""
 
@@ -183,8 +183,8 @@ def judge(search: Search) -> Verdict:
             rejected.append((candidate, "it makes the largest residual of held-out poses larger"))
         elif is_implausible(estimates):
             rejected.append((candidate, SIZE_UNDETERMINED))
-        elif bounded and len(several) == 1:
-            rejected.append((candidate, "its parameters would have to lie at their bounds"))
+        elif (bounded and len(several) == 1) or any(map(is_out_of_bounds, estimates)):
+            rejected.append((candidate, AT_BOUNDS))
         else:
             joints, fixed = (
                 clear_joints(candidate, estimates, search.confirmed),
@@ -370,13 +370,6 @@ def ambiguity_set(search: Search, group: int, observable: bool) -> tuple[Candida
         r.candidate for r in against if r.margin < (-BUILT if built and observable and r.is_decoy else MARGIN)
     ]
     return (mine, *(c for c in fewest_parameters([mine, *near]) if c is not mine))
-
-
-def is_implausible(estimates: Sequence[Estimate]) -> bool:
-    """Whether all that was found is beyond plausible sizes, with intervals of more than half of it: past the load at
-    which a tooth changes sides, say, readings do not determine how wide its gap is."""
-    sizes = [(abs(e.value - e.unknown.parameter.null), e.unknown.parameter.scale, e.ci95) for e in estimates]
-    return bool(sizes) and all(size > UNUSUAL * scale and wide > 0.5 * size for size, scale, wide in sizes)
 
 
 def _against(search: Search, mine: Candidate) -> list[Alternative]:

@@ -45,6 +45,9 @@ ABOUT, ALONG = 1.4, 0.9
 """How far a ratio may be from that of a unit, and the cosine of deflections with those foreseen from which on there is
 a ratio."""
 
+GAP, SEVERAL = 50.0, 3
+"""Ratio of distances from the origin between which no row is, and rows on either side: of another unit."""
+
 FAR = 3.0 * MM
 """Absolute positions that a registration leaves further away, root mean square, are checked."""
 
@@ -121,6 +124,8 @@ def check_numbers(readings: Readings, unknowns: Sequence[Unknown], model: Stiffn
     _check_loads(readings, unknowns, model, file)
     if readings.deflection:
         _check_size(readings, file)
+    else:
+        _check_units_of_rows(readings)
 
 
 def _check_loads(readings: Readings, unknowns: Sequence[Unknown], model: StiffnessModel, file: str) -> None:
@@ -149,6 +154,30 @@ def _check_loads(readings: Readings, unknowns: Sequence[Unknown], model: Stiffne
                 help="measure poses with and without the load, or with loads of different size",
             )
         )
+
+
+def _check_units_of_rows(readings: Readings) -> None:
+    """Refuses (IDN012) places of which some are far nearer to the origin than all others, and none is in between."""
+    size = np.linalg.norm(np.nan_to_num(readings.value), axis=1)
+    rows = np.flatnonzero((size > 0) & ~readings.based)
+    rows = rows[np.argsort(size[rows], kind="stable")]
+    apart = size[rows[1:]] > GAP * size[rows[:-1]]
+    apart[: SEVERAL - 1] = apart[len(apart) + 1 - SEVERAL :] = False
+    if not apart.any():
+        return
+    near, far = rows[: np.argmax(apart) + 1], rows[np.argmax(apart) + 1 :]
+    file, line = readings.where(int(near.min()))
+    times = float(np.median(size[far]) / np.median(size[near]))
+    raise Refusal(
+        Finding(
+            "IDN012",
+            f"the places of {len(near)} rows from line {line} on are some {times:.2g} times nearer to the origin than"
+            " the others: are X, Y, Z of some rows in another unit?",
+            file,
+            line,
+            help="X, Y, Z are in mm in all rows",
+        )
+    )
 
 
 def _check_size(readings: Readings, file: str) -> None:
@@ -379,6 +408,10 @@ def _alternatives(readings: Readings, campaign: Campaign) -> Iterator[tuple[str,
         if readings.joints[a][1] == readings.joints[b][1]:
             names = f"the columns of {readings.joints[a][0]} and {readings.joints[b][0]}"
             yield f"{names} exchanged", replace(readings, q=_exchanged(readings.q, a, b), direction=None)
+    for k, (name, _) in enumerate(readings.joints):
+        q = readings.q.copy()
+        q[:, k] *= -1.0
+        yield f"the opposite sign of {name}", replace(readings, q=q, direction=None)
     if campaign.tracked:
         # a tracker may be anyhow: which two it is does not show
         value = _exchanged(readings.value, 0, 1)
