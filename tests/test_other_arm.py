@@ -94,7 +94,7 @@ def test_readings_of_other_poses_are_not_diagnosed_as_a_missing_effect(tmp_path:
 def test_a_tracker_was_moved_only_where_that_explains_the_readings(
     tmp_path: Path, later: float, moved: bool
 ) -> None:
-    """Two stations left 360 mm of readings whose later half was in metres, one 1.8 m: the tripod was accused."""
+    """Of readings whose later half was in metres 360 mm remained with two stations: the tripod was blamed."""
     rng = np.random.default_rng(5)
     robot, data = tmp_path / "robot.yaml", tmp_path / "data.csv"
     robot.write_bytes(COBOT.file())
