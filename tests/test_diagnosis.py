@@ -20,6 +20,7 @@ from postproc.diagnosis.candidate_fits import ChoiceFits
 from postproc.diagnosis.candidates import candidates, fewest_parameters, is_visible
 from postproc.diagnosis.decoys import AlternativeForm, decoys
 from postproc.diagnosis.diagnosis import diagnose
+from postproc.diagnosis.imitations import is_implausible
 from postproc.diagnosis.nonlinear_effects import broyden_update, evaluate_at_size
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
 from postproc.diagnosis.search import SHARED, drop_confounded, limit_shared_scatter, model_unknowns, search
@@ -31,7 +32,6 @@ from postproc.diagnosis.verdict import (
     OTHER_COURSE,
     ambiguity_set,
     held_out_gain,
-    is_implausible,
     judge,
 )
 from postproc.effects import Conditions

@@ -14,6 +14,7 @@ from postproc.diagnosis.accidents import are_accidents, far_readings, loaded_joi
 from postproc.diagnosis.decoys import BentCompliance, LeaningCompliance, LoadedPlay, decoys
 from postproc.diagnosis.diagnosis import diagnose
 from postproc.diagnosis.held_out import left_out_variance
+from postproc.diagnosis.imitations import changes_with_posture, is_out_of_bounds
 from postproc.diagnosis.selection import explained, problem
 from postproc.effects import Conditions
 from postproc.identification.campaign import Campaign
@@ -34,12 +35,13 @@ def told(row, number, seed):
         (99, 9500, "windup"),
         (38, 9500, "loose_flange"),
         (117, 9500, "leaning_stiffness"),
+        (10, 13000, "hose_package"),
         pytest.param(63, 9500, "windup", marks=pytest.mark.slow),
     ],
 )
 def test_what_no_library_has_is_given_no_name(number, seed, what):
     """A wound-up gear was named hysteresis, a clearance a soft bearing, a stiffness that leans on another joint a
-    length."""
+    length, a hose the wave of a gear."""
     case, verdict = told("outside", number, seed)
     assert case.effects == (what,)
     assert (verdict.word, verdict.named) == ("unknown", ())
@@ -146,3 +148,35 @@ def test_an_imitation_fails_where_it_was_not_fitted(bend, fails):
     variance, count = left_out_variance(SimpleNamespace(linear=linear), explained(given, ()), part)
     assert count == 240
     assert (variance > 1.5) == fails
+
+
+@pytest.mark.parametrize(
+    ("fades", "own", "changes"), [(0.0, 0.0, False), (0.8, 0.0, True), (0.0, 0.8, False)]
+)
+def test_what_fades_as_another_joint_turns_is_no_law_of_one(fades, own, changes):
+    """What the joint's own angle does to it is a form of the law itself."""
+    rng = np.random.default_rng(2)
+    q = rng.uniform(-2.0, 2.0, (60, 2))
+    pulls = np.stack([np.sin(q[:, 0]), np.cos(q[:, 0]), np.ones(60)], axis=1)
+    column = np.ravel(pulls)[:, None]
+    size = np.repeat(1.0 + fades * np.sin(q[:, 1]) + own * np.sin(q[:, 0]), 3)
+    target = 3.0 * column[:, 0] * size + rng.normal(size=180)
+    basis = np.zeros((180, 0))
+    given = problem(target, basis, [(column, np.array([[-1e9, 1e9]]))], 180, True, 60)
+    candidate = SimpleNamespace(joint="A1")
+    linear = SimpleNamespace(problem=given, basis=basis, columns=(column,), priors=0, candidates=(candidate,))
+    robot = SimpleNamespace(joints=[SimpleNamespace(name="A1"), SimpleNamespace(name="A2")])
+    campaign = SimpleNamespace(readings=SimpleNamespace(q=q))
+    search = SimpleNamespace(
+        linear=linear, base=SimpleNamespace(model=SimpleNamespace(robot=robot), campaign=campaign)
+    )
+    assert changes_with_posture(search, explained(given, (0,)), 0) == changes
+
+
+@pytest.mark.parametrize(
+    ("value", "at_bound", "beyond"), [(1e3, True, True), (1e3, False, False), (50.0, True, False)]
+)
+def test_an_unusual_value_at_its_bound_was_not_found(value, at_bound, beyond):
+    parameter = SimpleNamespace(null=0.0, scale=30.0, hardware=False)
+    estimate = SimpleNamespace(value=value, at_bound=at_bound, unknown=SimpleNamespace(parameter=parameter))
+    assert is_out_of_bounds(estimate) == beyond

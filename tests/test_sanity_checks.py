@@ -212,6 +212,35 @@ def test_places_in_another_unit(kind, unit, size):
     assert f"with positions in {unit} (" in message
 
 
+@pytest.mark.parametrize("kind", ["deflections", "tracker", "robot"])
+@pytest.mark.parametrize("joint", [1, 2])
+def test_the_opposite_sign_of_a_joint(kind, joint):
+    readings, asked = good(kind)
+    q = readings.q * np.where(np.arange(3) == joint, -1.0, 1.0)
+    message = refused(replace(readings, q=q), asked, "IDN014")
+    assert f"with the opposite sign of J{joint + 1} (" in message
+
+
+def test_a_target_elsewhere_than_stated():
+    readings, asked = good("tracker")
+    first, other = readings.targets[:2]
+    moved = {**readings.places, first: readings.places[first] + [0.0, 0.08, 0.1]}
+    message = refused(replace(readings, places=moved), asked, "IDN014")
+    assert f"with another place of target {first} than the stated one (" in message
+    changed = {**readings.places, first: readings.places[other], other: readings.places[first]}
+    message = refused(replace(readings, places=changed), asked, "IDN014")
+    assert f"with the targets {first} and {other} exchanged (" in message
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e3])
+def test_places_of_some_rows_in_another_unit(size):
+    readings, asked = good("tracker")
+    value = readings.value.copy()
+    value[6:12] *= size
+    message = refused(replace(readings, value=value), asked, "IDN012")
+    assert "are X, Y, Z of some rows in another unit?" in message
+
+
 def test_of_posed_readings_the_places_are_looked_at():
     readings, asked = good("robot")
     turned = np.tile(np.eye(3), (len(readings), 1, 1))

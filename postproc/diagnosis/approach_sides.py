@@ -16,7 +16,7 @@ from postproc.diagnosis.residual_patterns import patterns
 from postproc.diagnosis.sample import sample_of
 from postproc.diagnosis.search_result import Search
 from postproc.diagnosis.selection import basis_of, outside
-from postproc.diagnosis.verdict import AS_WELL, OTHER_COURSE
+from postproc.diagnosis.verdict import AS_WELL, FORMLESS
 from postproc.identification.campaign import Campaign
 from postproc.identification.joint_scatter import visits_of
 from postproc.model import StiffnessModel
@@ -61,7 +61,7 @@ def diagnose_sides(
             return other, (_finding(readings.where(0)[0], "they are taken from the order of the rows"),)
     if done.verdict.conditional or done.verdict.word in SOUND:
         return done, ()
-    if any(why in (AS_WELL, OTHER_COURSE) for _, why in done.verdict.rejected):
+    if any(why in (AS_WELL, *FORMLESS) for _, why in done.verdict.rejected):
         return done, ()  # sides that are free to follow a course over the angles imitate it
     for joint, sides in _shown(done):
         direction = np.zeros_like(readings.q)

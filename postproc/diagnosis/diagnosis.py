@@ -20,8 +20,8 @@ from postproc.diagnosis.unmoved_parameters import restore_unmoved_parameters
 from postproc.diagnosis.unstated_geometry import take_in_unstated_geometry
 from postproc.diagnosis.verdict import (
     AS_WELL,
+    FORMLESS,
     ONLY_TOGETHER,
-    OTHER_COURSE,
     SIZE_UNDETERMINED,
     Verdict,
     judge,
@@ -89,7 +89,7 @@ def diagnose(
     rejected = list(verdict.rejected)
     for _ in range(AGAIN):
         # of what has no form that is known others would only be imitations
-        if not verdict.rejected or any(why == OTHER_COURSE for _, why in verdict.rejected):
+        if not verdict.rejected or any(why in FORMLESS for _, why in verdict.rejected):
             break
         if not goes_on(result):
             break

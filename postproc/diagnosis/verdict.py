@@ -20,8 +20,11 @@ from postproc.diagnosis.held_out import (
 )
 from postproc.diagnosis.imitations import (
     MARGIN,
+    changes_with_posture,
     follows_another_course,
+    is_implausible,
     is_in_another_course,
+    is_out_of_bounds,
     laws_on_one_joint,
 )
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
@@ -46,9 +49,6 @@ CLEAR, THERE = 1.5, 1.0
 BUILT = 4.6
 """By how much -2 ln(likelihood) of what is no such thing must be better to question hardware that the robot file
 describes: odds of 10 to 1."""
-
-UNUSUAL = 3.0
-"""Usual sizes from which on a parameter has to be determined well to be believed."""
 
 EXCESS = 3.0
 """Standard deviations of its own by which the remaining variance must exceed the stated one to be a lack of fit."""
@@ -85,6 +85,11 @@ CHANCE_OF_JOINT = 0.05
 NOT_ENOUGH = "too much would remain for a name"
 AS_WELL = "another course over the same joint explains as much, and more remains than scatter"
 OTHER_COURSE = "the readings follow another course than that of this effect"
+OTHER_SIZES = "it would have to be of another size at other angles of the other joints"
+AT_BOUNDS = "its parameters would have to lie at their bounds"
+FORMLESS = (OTHER_COURSE, OTHER_SIZES)
+"""Reasons that say that what is missing has no form that is known."""
+
 PART_OF_COURSE = "what it would explain is a part of that other course"
 TWO_LAWS = "it fits only beside another law of lost motion on the same joint, and more remains than scatter"
 ONLY_TOGETHER = "it fits only beside an effect that the readings cannot distinguish from others"
@@ -164,6 +169,8 @@ def judge(search: Search) -> Verdict:
         several = ambiguity_set(search, g, not bounded and _is_observable(candidate, estimates))
         if follows_another_course(search, candidate, -MARGIN):
             rejected.append((candidate, OTHER_COURSE))
+        elif changes_with_posture(search, last, g):
+            rejected.append((candidate, OTHER_SIZES))
         elif (
             unexplained
             and candidate.name not in HAS_DECOYS
@@ -176,8 +183,8 @@ def judge(search: Search) -> Verdict:
             rejected.append((candidate, "it makes the largest residual of held-out poses larger"))
         elif is_implausible(estimates):
             rejected.append((candidate, SIZE_UNDETERMINED))
-        elif bounded and len(several) == 1:
-            rejected.append((candidate, "its parameters would have to lie at their bounds"))
+        elif (bounded and len(several) == 1) or any(map(is_out_of_bounds, estimates)):
+            rejected.append((candidate, AT_BOUNDS))
         else:
             joints, fixed = (
                 clear_joints(candidate, estimates, search.confirmed),
@@ -198,7 +205,7 @@ def judge(search: Search) -> Verdict:
         named, aliases = [named[k] for k in kept], [aliases[k] for k in kept]
         groups = [groups[k] for k in kept]
         sets = tuple(a for a in aliases if len({(c.name, c.joint) for c in a}) > 1)
-    formless = any(why == OTHER_COURSE for _, why in rejected)
+    formless = any(why in FORMLESS for _, why in rejected)
     if formless:
         # a zero of the joint that follows another course may be a part of that course
         kept = [k for k, g in enumerate(groups) if not is_in_another_course(search, last, g)]
@@ -363,13 +370,6 @@ def ambiguity_set(search: Search, group: int, observable: bool) -> tuple[Candida
         r.candidate for r in against if r.margin < (-BUILT if built and observable and r.is_decoy else MARGIN)
     ]
     return (mine, *(c for c in fewest_parameters([mine, *near]) if c is not mine))
-
-
-def is_implausible(estimates: Sequence[Estimate]) -> bool:
-    """Whether all that was found is beyond plausible sizes, with intervals of more than half of it: past the load at
-    which a tooth changes sides, say, readings do not determine how wide its gap is."""
-    sizes = [(abs(e.value - e.unknown.parameter.null), e.unknown.parameter.scale, e.ci95) for e in estimates]
-    return bool(sizes) and all(size > UNUSUAL * scale and wide > 0.5 * size for size, scale, wide in sizes)
 
 
 def _against(search: Search, mine: Candidate) -> list[Alternative]:

@@ -23,6 +23,10 @@ from postproc.model import StiffnessModel
 LEFT = 0.5
 """Share of the residual, root mean square, that a tracker or targets elsewhere must leave at most to be reported."""
 
+AT_MOST = 0.02
+"""Share of the extent of the measured places that a moved tracker may leave: what leaves more is no robot's error, and
+its cause is another one."""
+
 CLEAR = 5.0
 """Times what then remains that they must have moved by."""
 
@@ -171,7 +175,8 @@ def _moved_tracker(campaign: Campaign, model: StiffnessModel) -> tuple[Readings,
     changed = replace(readings, session=session, sessions=(*readings.sessions, f"{name}, from line {line}"))
     other = Campaign(changed, campaign.stated_tool)
     _, after = _registered(other, model)
-    if _rms(after) > LEFT * _rms(before):
+    extent = np.linalg.norm(readings.value - np.nanmedian(readings.value, axis=0), axis=1)
+    if _rms(after) > LEFT * _rms(before) or _rms(after) > AT_MOST * np.nanmedian(extent):
         return readings, []
     message = (
         f"the tracker was moved before line {line}: one station leaves {_rms(before) / MM:.3g} mm RMS, two"

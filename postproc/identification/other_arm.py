@@ -75,7 +75,7 @@ def check_arm(campaign: Campaign, model: StiffnessModel) -> None:
         f"no lengths and zeros of this arm explain the readings: {remaining / MM:.3g} mm remain of places that are"
         f" {extent / MM:.3g} mm from their middle, even with all of them free"
     )
-    help = "check robot and joint angles: the readings are probably those of another robot"
+    help = "check robot, joint angles and the order of the rows: these are readings of another robot, or of other poses"
     raise Refusal(Finding("IDN035", message, file, help=help))
 
 

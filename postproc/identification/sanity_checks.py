@@ -6,9 +6,8 @@ tried out: the one change to the data that makes the fit much better is named.  
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
 from postproc.identification.campaign import Campaign
+from postproc.identification.changed_readings import changed_readings
 from postproc.identification.least_squares import at, bounded_step, descended, reach, with_columns
 from postproc.identification.noise import noise_of, weighting
 from postproc.identification.registration import registered
@@ -44,6 +44,9 @@ UNITS = (
 ABOUT, ALONG = 1.4, 0.9
 """How far a ratio may be from that of a unit, and the cosine of deflections with those foreseen from which on there is
 a ratio."""
+
+GAP, SEVERAL = 50.0, 3
+"""Ratio of distances from the origin between which no row is, and rows on either side: of another unit."""
 
 FAR = 3.0 * MM
 """Absolute positions that a registration leaves further away, root mean square, are checked."""
@@ -121,6 +124,8 @@ def check_numbers(readings: Readings, unknowns: Sequence[Unknown], model: Stiffn
     _check_loads(readings, unknowns, model, file)
     if readings.deflection:
         _check_size(readings, file)
+    else:
+        _check_units_of_rows(readings)
 
 
 def _check_loads(readings: Readings, unknowns: Sequence[Unknown], model: StiffnessModel, file: str) -> None:
@@ -149,6 +154,30 @@ def _check_loads(readings: Readings, unknowns: Sequence[Unknown], model: Stiffne
                 help="measure poses with and without the load, or with loads of different size",
             )
         )
+
+
+def _check_units_of_rows(readings: Readings) -> None:
+    """Refuses (IDN012) places of which some are far nearer to the origin than all others, and none is in between."""
+    size = np.linalg.norm(np.nan_to_num(readings.value), axis=1)
+    rows = np.flatnonzero((size > 0) & ~readings.based)
+    rows = rows[np.argsort(size[rows], kind="stable")]
+    apart = size[rows[1:]] > GAP * size[rows[:-1]]
+    apart[: SEVERAL - 1] = apart[len(apart) + 1 - SEVERAL :] = False
+    if not apart.any():
+        return
+    near, far = rows[: np.argmax(apart) + 1], rows[np.argmax(apart) + 1 :]
+    file, line = readings.where(int(near.min()))
+    times = float(np.median(size[far]) / np.median(size[near]))
+    raise Refusal(
+        Finding(
+            "IDN012",
+            f"the places of {len(near)} rows from line {line} on are some {times:.0f} times nearer to the origin than"
+            " the others: are X, Y, Z of some rows in another unit?",
+            file,
+            line,
+            help="X, Y, Z are in mm in all rows",
+        )
+    )
 
 
 def _check_size(readings: Readings, file: str) -> None:
@@ -198,7 +227,7 @@ def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unkn
         some = np.arange(len(campaign))
     few = campaign.readings.part(some)
     here, _ = _remaining_share(Campaign(few, campaign.stated_tool), model, unknowns)
-    tried = list(_alternatives(few, campaign))
+    tried = list(changed_readings(few, campaign))
     # the linear problem shows which changes may help
     sizes = _first_steps([changed for _, changed in tried], campaign.stated_tool, model, unknowns)
     nearest = [tried[k] for k in np.argsort(sizes, kind="stable")[:FOLLOWED] if sizes[k] < here]
@@ -370,43 +399,3 @@ def _remaining_share(
 
 def _rms(values: Floats) -> float:
     return float(np.sqrt(3 * np.nanmean(values**2)))
-
-
-def _alternatives(readings: Readings, campaign: Campaign) -> Iterator[tuple[str, Readings]]:
-    """Each change in words, and the changed readings."""
-    letters = ("DX", "DY", "DZ") if readings.deflection else ("X", "Y", "Z")
-    for a, b in combinations(range(readings.q.shape[1]), 2):
-        if readings.joints[a][1] == readings.joints[b][1]:
-            names = f"the columns of {readings.joints[a][0]} and {readings.joints[b][0]}"
-            yield f"{names} exchanged", replace(readings, q=_exchanged(readings.q, a, b), direction=None)
-    if campaign.tracked:
-        # a tracker may be anyhow: which two it is does not show
-        value = _exchanged(readings.value, 0, 1)
-        yield "two of X, Y, Z exchanged, or one of them with the other sign", replace(readings, value=value)
-    for a, b in combinations(range(3), 2) if not campaign.tracked else ():
-        value = _exchanged(readings.value, a, b)
-        yield f"{letters[a]} and {letters[b]} exchanged", replace(readings, value=value)
-    if readings.deflection:
-        value = -readings.value
-        yield "the opposite sign of all deflections (unloaded minus loaded)", replace(readings, value=value)
-        for a, b in combinations(range(3), 2):
-            names = f"F{'XYZ'[a]} and F{'XYZ'[b]}"
-            yield f"{names} exchanged", replace(readings, wrench=_exchanged(readings.wrench, a, b))
-    else:
-        for word, factor in (("metres", 1e3), ("inches", 25.4), ("micrometres", 1e-3)):
-            yield f"positions in {word}", replace(readings, value=readings.value * factor)
-    if not campaign.tracked:
-        for k in range(3):
-            value = readings.value.copy()
-            value[:, k] *= -1.0
-            yield f"the opposite sign of {letters[k]}", replace(readings, value=value)
-        for shift in (1, 2):
-            value = np.roll(readings.value, shift, axis=1)
-            order = ", ".join(np.roll(letters, -shift))
-            yield f"the columns named {order}", replace(readings, value=value)
-
-
-def _exchanged(values: Floats, a: int, b: int) -> Floats:
-    changed = values.copy()
-    changed[:, [a, b]] = changed[:, [b, a]]
-    return changed

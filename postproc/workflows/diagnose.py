@@ -16,6 +16,7 @@ from postproc.diagnosis.approach_sides import diagnose_sides
 from postproc.diagnosis.diagnosis import Diagnosis, diagnose
 from postproc.diagnosis.search import model_unknowns
 from postproc.identification.campaign import Campaign
+from postproc.identification.other_arm import check_arm
 from postproc.identification.sanity_checks import check_fit, check_numbers
 from postproc.identification.validation import held_out, validated
 from postproc.measurements import measurements_csv, read_measurements
@@ -67,7 +68,11 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
     campaign, model = measured.campaign, measured.model
     own = model_unknowns(model)
     check_numbers(measured.readings, (), model)
-    findings = [*measured.findings, *check_fit(campaign, model, own)]
+    bad = check_fit(campaign, model, own)
+    if bad and not campaign.readings.deflection:
+        stage("checking the arm")
+        check_arm(campaign, model)
+    findings = [*measured.findings, *bad]
     diagnosis, sides = diagnose_sides(campaign, model, stage)
     findings += sides
     struck, wild = campaign_of(diagnosis), far_readings(diagnosis.final)
