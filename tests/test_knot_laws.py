@@ -124,6 +124,17 @@ def test_points_keep_the_shortest_motion_from_each_other_and_from_the_ends():
         np.testing.assert_allclose(got, kept, rtol=1e-9)
 
 
+@pytest.mark.parametrize("approximation", [0.0, 0.2, np.nan])
+def test_behind_a_ramp_that_is_shorter_than_any_motion_nothing_is_divided(approximation):
+    """Off is nothing but the first 0.5 mm, so that one point is all that helps, at the distance that it may have."""
+    for end in (0.1, 0.3, 0.45):
+        job = ramped({2: 2.0}, {2: end}, [50, 60, 50], approximation)
+        found = inserted(job, row=2)
+        assert found[0] == pytest.approx(0.5)
+        assert found[-1] < 3.0
+        assert len(found) <= 3
+
+
 def test_nothing_is_inserted_where_nothing_may_be():
     job = ramped({2: 0.3}, {2: 5.0}, [50, 100, 50], 2.0)
     assert len(inserted(job)) > 0

@@ -102,6 +102,13 @@ def _knots(motions: DivisibleMotions) -> tuple[Ints, Floats]:
     on cuts alone, as in air nothing is cut between the points."""
     ramps = motions.task.force.ramps
     row, share = (np.empty(0, np.int64), np.empty(0)) if ramps is None else ramps.ends()
+    if ramps is not None:
+        # of a ramp that is shorter than any motion may be, nothing is behind the first point
+        many = np.bincount(ramps.row, minlength=motions.n)
+        single = ramps.row[(many[ramps.row] == 1) & (ramps.start <= 0.0) & ~ramps.before]
+        nearest = motions.spacing(row, motions.limits.ramp_end)
+        nearest /= np.maximum(motions.task.desired_path.length[row], SAME)
+        share = np.where(np.isin(row, single), np.maximum(share, nearest), share)
     if motions.task.lost_motion is not None:
         every = np.arange(motions.n)
         crossed = find_reversals(motions.task, motions.spacing(every, motions.limits.min_segment))

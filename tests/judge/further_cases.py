@@ -102,7 +102,30 @@ def two_tools() -> Callable[[Path], Path]:
     )  # fmt: skip
 
 
+def entered(*approach: str, leave: str, motions: tuple[str, ...]) -> Callable[[Path], Path]:
+    """A cut from (0, 0, 0) through straight ``motions``, with these in air before and behind it."""
+    return krl(*approach, CUT, *motions, OFF, leave)
+
+
+ARC_ON = (
+    f"LIN {pose(-20, -20, 0)}",
+    f"CIRC {pose(-5.858, -14.142, 0)},{pose(*START)}",
+)
+ARC_OFF = f"CIRC {pose(5.858, 114.142, 0)},{pose(20, 120, 0)}"
+IDLE = (
+    f"LIN {pose(100, 0, 0)}",
+    ";FORCE 0 0 0 @feed",
+    f"LIN {pose(150, 0, 0)}",
+    CUT,
+    f"LIN {pose(250, 0, 0)}",
+)
+
+
 FURTHER: list[Case] = [
+    Case("entered by PTP", entered(f"PTP {pose(*START)}", leave=f"PTP {pose(100, 0, 50)}",
+                                   motions=(f"LIN {pose(100, 0, 0)}",))),
+    Case("entered and left by arcs in air", entered(*ARC_ON, leave=ARC_OFF, motions=(f"LIN {pose(0, 100, 0)}",))),
+    Case("no force between two cuts", entered(f"LIN {pose(*START)}", leave=f"LIN {pose(250, 0, 50)}", motions=IDLE)),
     Case("entered from above, C_DIS 3", contour(SQUARE, "C_DIS", 3, "C_DIS")),
     Case("entered in line, C_DIS 3", contour(SQUARE, "C_DIS", 3, "C_DIS", above=(-40, 0, 0))),
     Case("left, C_DIS 3", contour(SQUARE, "C_DIS", 3, leave="C_DIS", above=SLANT)),

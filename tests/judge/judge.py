@@ -125,6 +125,11 @@ def judge(
     largest = max((np.linalg.norm(m.force[0][:3]) for m in first.motions if not m.air), default=0.0)
     correct = correction_along(first) if rule == STRETCHED else None
     fields = [Field(first, low, high, cell.ramp, largest, rule, correct) for low, high in cuts]
+    nodes = second.joints_at_nodes()
+    others = [
+        _behind_lead(first, cut, second, rows, one, nodes)
+        for cut, rows, one in zip(cuts, others, fields, strict=True)
+    ]
     before = _run(first, cuts, first, cuts, fields, step)
     after = _run(first, cuts, second, others, fields, step)
     return Verdict(before, after, cell, len(cuts), (len(first.motions), len(second.motions)))
@@ -160,6 +165,24 @@ def cuts_of(motions: list[Motion]) -> list[tuple[int, int]]:
     first = np.flatnonzero(air[:-1] & ~air[1:])
     last = np.flatnonzero(~air[:-1] & air[1:]) - 1
     return list(zip(first.tolist(), last.tolist(), strict=True))
+
+
+def _behind_lead(
+    wanted: Path, cut: tuple, path: Path, rows: tuple[int, int], force: Field, nodes: tuple
+) -> tuple[int, int]:
+    """The motions of a cut without a straight one that leads from where the original's cut starts to where the tool is
+    there under its first force: the program has it after a jump or an arc in air, before the tool meets the material,
+    though behind the comment that states the force."""
+    low, high = rows
+    start, digits = wanted.place[cut[0], 0], 2e-6
+    if high - low <= cut[1] - cut[0] or path.motions[low].kind != "LIN":
+        return rows
+    if np.linalg.norm(path.place[low, 0] - start) > digits:
+        return rows
+    there = Tools(path, rows, path.start[low + 1 : low + 2], nodes).loaded(
+        force.at(wanted.start[cut[0] : cut[0] + 1])
+    )[0]
+    return (low + 1, high) if np.linalg.norm(there - start) < wanted.cell.tolerance else rows
 
 
 def _run(wanted: Path, cuts: list, path: Path, own: list, fields: list[Field], step: float) -> Run:

@@ -21,8 +21,8 @@ class Motion:
     [m], normal (3,) and turns (whole extra turns): of an arc about a stated centre, positive about the normal; angle
     [rad]: CA of a CIRC.  base, tool: (rotation, position).  spindle (3,): in tool axes, tip-ward.  feed [m/s].
     approximation [m]: 0 an exact stop, CONTINUOUS no stop and no stated distance.  external: E1 .. E6 [mm or deg].
-    force: six numbers and their frame, None in air.  status, turn: of a PTP.  orientation_type, circle_type: #VAR,
-    #CONSTANT, #JOINT; #BASE, #PATH.  block: number of the spline block.  words (3,)
+    force: six numbers and their frame, None or zeros in air.  status, turn: of a PTP.  orientation_type, circle_type:
+    #VAR, #CONSTANT, #JOINT; #BASE, #PATH.  block: number of the spline block.  words (3,)
     [rad]: rotary A, B, C that turn the tool; they run evenly.  turns: the turns that another target can state, "any",
     those of the tool's "axis", or "none"."""
 
@@ -52,7 +52,7 @@ class Motion:
 
     @property
     def air(self) -> bool:
-        return self.force is None or self.kind in ("PTP", "AXIS")
+        return self.force is None or not self.force[0].any() or self.kind in ("PTP", "AXIS")
 
 
 def about(axis: int, angle: float) -> np.ndarray:
