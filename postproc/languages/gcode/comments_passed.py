@@ -1,7 +1,7 @@
 """Which FORCE and COMPENSATE comments are in force at the steps of a run, whatever it does at branches.
 
-A branch, a loop or a jump of which it is not known what it does is a piece with arms: what is in force behind it is what
-all of them leave, and what was in force ahead where none may run.
+A branch, a loop or a jump of which it is not known what it does is a piece with arms: what is in force behind it is
+what all of them leave, and what was in force ahead where none may run.
 """
 
 from __future__ import annotations
