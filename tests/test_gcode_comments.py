@@ -59,6 +59,7 @@ def forces(text: str) -> dict[str, str]:
         # a slash
         ("(FORCE 1 0 0)\n/ (FORCE 2 0 0)\n", "?"),
         ("(FORCE 1 0 0)\nN7 /2 (FORCE 2 0 0)\n", "?"),
+        ("(FORCE 1 0 0)\n/ (A) (FORCE 2 0 0)\n", "?"),
         ("(FORCE 1 0 0)\n/ (FORCE 1 0 0)\n", "FORCE 1 0 0"),
         ("(FORCE 1 0 0)\n/G1 X9. Y0. Z0. (FORCE 2 0 0)\n", "?"),
         # loops

@@ -15,14 +15,16 @@ import numpy as np
 import pytest
 from gcode_writing import read, round_trip
 
+from postproc.base.arrays import Floats
 from postproc.languages.gcode import DIALECTS
+from postproc.toolpath import Toolpath
 
 DIALECT = {dialect.name: dialect for dialect in DIALECTS}
 HEAD = {
     "fanuc": "O1\nG21 G90 G17 G54 G94\nT1 M6\nG0 X0. Y0. Z0.\nF300.\n",
     "sinumerik": "G71 G90 G17 G54 G94\nT1 D1\nG0 X0. Y0. Z0.\nF300\n",
 }
-PLANES = {17: "XYZ", 18: "ZXY", 19: "YZX"}
+PLANES = {17: ("X", "Y", "Z"), 18: ("Z", "X", "Y"), 19: ("Y", "Z", "X")}
 Point = dict[str, float]
 
 
@@ -168,13 +170,14 @@ class Drawn:
         self.here = there
 
 
-def middle_of_arc(path, row) -> np.ndarray:
+def middle_of_arc(path: Toolpath, row: int) -> Floats:
     begin, centre, normal = path.position[row - 1], path.arcs.centre[row], path.arcs.normal[row]
     angle, spoke = path.arcs.sweep[row] / 2, begin - centre
     rise = (path.position[row] - begin) @ normal / 2
     spoke = spoke - (spoke @ normal) * normal
     foot = begin - spoke
-    return foot + np.cos(angle) * spoke + np.sin(angle) * np.cross(normal, spoke) + rise * normal
+    middle = foot + np.cos(angle) * spoke + np.sin(angle) * np.cross(normal, spoke) + rise * normal
+    return np.asarray(middle, dtype=np.float64)
 
 
 @pytest.mark.parametrize("name", ["fanuc", "sinumerik"])

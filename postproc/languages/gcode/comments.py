@@ -26,7 +26,7 @@ _HEAD = re.compile(
     re.I,
 )
 _EMPTY = re.compile(rb"[ \t\r]*+\n")
-_DELETED = re.compile(rb"[ \t]*+(?:N[ \t]*+\d++[ \t]*+)?/[ \t]*+\d?[ \t]*+", re.I)
+_DELETED = re.compile(rb"[ \t]*+(?:N[ \t]*+\d++[ \t]*+)?/", re.I)
 
 
 class Remarks(NamedTuple):
@@ -77,8 +77,8 @@ def remarks(
 
 
 def _slash(raw: bytes, start: int) -> bool:
-    """Whether a slash is before the comment at ``start`` and nothing else in its line: it may be passed over."""
-    return _DELETED.fullmatch(raw, raw.rfind(b"\n", 0, start) + 1, start) is not None
+    """Whether the line of the comment at ``start`` begins with a slash: it may be passed over."""
+    return _DELETED.match(raw, raw.rfind(b"\n", 0, start) + 1, start) is not None
 
 
 def _conditional(at: Ints, alone: Bools, execution: Execution, flow: ExecutionFlow) -> Bools:
