@@ -106,6 +106,10 @@ def fanuc() -> dict[str, list[str]]:
                 line for k in range(4) for line in (f"G68 X50. Y50. R{k * 90}.", *pocket(1), "G69")
             ), *end,
         ],
+        "fanuc-mirrored.nc": [
+            *head, *change, *pocket(1), "G51.1 X-50.", *pocket(1), "G51.1 Y0.", *pocket(1), "G50.1 X0. Y0.", *pocket(1),
+            *end,
+        ],
         "fanuc-rotary-indexed.nc": [
             *head, *change, *pocket(1), "G91 G28 Z0.", "G90 G0 B90.", *change, *pocket(1), "G0 B0.", *pocket(2), *end,
         ],
@@ -137,6 +141,10 @@ def sinumerik() -> dict[str, list[str]]:
         "840d-swivel-cba.mpf": [
             *head, *change, 'CYCLE800(1,"TC1",200000,27,0,0,0,0,90,0,0,0,0,1,0,0)', *pocket(), "CYCLE800()",
             "SUPA G0 Z0 D0", 'CYCLE800(0,"0",0,27,0,0,0,0,0,0,0,0,0,1,0,0)', "D1", *pocket(1), *end,
+        ],
+        "840d-mirrored.mpf": [
+            *head, *change, *pocket(1), "TRANS X100", "AMIRROR X0", *pocket(1), "SCALE X1.5 Y1.5", *pocket(1), "SCALE",
+            *pocket(1), *end,
         ],
         "840d-drill.mpf": [
             *head, *change, "G0 X0 Y0", "Z50", "MCALL CYCLE81(50,0,2,-10)", "X10 Y10", "X20", "MCALL", *pocket(),

@@ -101,6 +101,11 @@ def run(name: str, text: str, **settings: object) -> list[str]:
         ("sinumerik", "CYCLE82(30,0,2,-5)\nG1 X1\n", ["1 0 30"]),
         ("sinumerik", "MCALL CYCLE81(R1,0,2,-5)\nX1\nMCALL\nG1 X2 Y2\n", ["?*", "?*"]),
         ("sinumerik", "R1=30\nMCALL CYCLE81(R1,0,2,-5)\nX1\nMCALL\nG1 X2\n", ["1 0 30*", "2 0 30"]),
+        # holes on a circle, a pocket, a corner: they state no axis, and end elsewhere or round what is before
+        ("fanuc", "G70 I5. J15. L12\nG1 X5.\nY1. Z1.\n", ["?*", "5 1 1"]),
+        ("fanuc", "G150 P100 I1. Q1.\nG1 X5. Y1.\n", ["?*"]),
+        ("fanuc", "G12 I5.\nG1 X5.\n", ["5 0 0"]),
+        ("fanuc", "G98 G81 X9. Y9. Z-1. R1. L0\nG80\nG1 Y5. Z1.\nX1.\n", ["?*", "?*", "1 5 1"]),
         ("sinumerik", "CYCLE800()\nG1 X1 Y1 Z1\n", ["1 1 1"]),
         ("sinumerik", 'CYCLE800(1,"",0,57,0,0,0,0,30,0,0,0,0,1)\nG1 X1 Y1 Z1\n', ["1.36603 1 0.366025"]),
         ("sinumerik", 'CYCLE800(1,"",0,57,0,0,0,0,R1,0,0,0,0,1)\nG1 X1 Y1 Z1\n', ["?*"]),

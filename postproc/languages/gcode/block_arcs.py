@@ -6,9 +6,10 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.units import MM
-from postproc.languages.gcode.arcs import ArcGeometry, ArcWords, arcs, through
+from postproc.languages.gcode.arcs import PLANES, ArcGeometry, ArcWords, arcs, through
 from postproc.languages.gcode.blocks import THROUGH, BlockWords
 from postproc.languages.gcode.control import Group, Move
+from postproc.languages.gcode.positions import Positions
 from postproc.languages.gcode.words import How, key
 
 
@@ -20,6 +21,15 @@ def given_by_point(block_words: BlockWords, rows: Ints) -> Bools:
         else np.zeros(len(rows), np.bool_)
     )
     return np.asarray(words | (block_words.move[rows] == Move.THROUGH))
+
+
+def unevenly_scaled(block_words: BlockWords, rows: Ints, plane: Ints, where: Positions) -> Bools:
+    """(N,) motions in the blocks ``rows`` (N,) whose circles in ``plane`` (N,) are none in the base."""
+    factors = np.array([np.linalg.norm(frame.turn, axis=0) for frame in where.frames])[where.frame[rows]]
+    within = np.where(given_by_point(block_words, rows), -1, plane)  # that of a point may be any
+    first, third = PLANES[within, 0], np.where(within < 0, -1, PLANES[within, 2])
+    apart = np.abs(factors - factors[np.arange(len(rows)), first, None]) > 1e-9
+    return np.asarray((apart & (np.arange(3) != third[:, None])).any(axis=1))
 
 
 def arcs_of_blocks(

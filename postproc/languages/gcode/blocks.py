@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from postproc.base.arrays import Bools, Floats, Ints, is_shared
 from postproc.base.units import DEG, MM
-from postproc.languages.gcode.control import Control, Group, Move, Once
+from postproc.languages.gcode.control import READ, Control, Group, Move, Once
 from postproc.languages.gcode.execution_flow import FlowReason
 from postproc.languages.gcode.integer_words import IntegerWords
 from postproc.languages.gcode.modal import Modal
@@ -31,7 +31,7 @@ SECOND = tuple(key(letter) for letter in "UVW")
 FRAMED = {
     Group.TURNED: "rotated coordinates (G68)",
     Group.SCALED: "scaled coordinates (G51)",
-    Group.MIRRORED: "mirrored coordinates (G51.1)",
+    Group.MIRRORED: "mirrored coordinates",
     Group.POLAR: "polar coordinates (G16)",
     Group.DIAMETER: "diameters (G7)",
     Group.LENGTHS: "an offset that the program computes",
@@ -40,6 +40,15 @@ FRAMED = {
     Group.OFFSETS: "those of a tool whose length the program adds to (TOFFL, DL)",
 }
 """Modes in which words are no coordinates of the base."""
+
+MIRRORING = (50.1, 51.1)
+"""Codes that mirror axes, and end that."""
+
+
+def framed(force: Ints) -> Bools:
+    """(B,) blocks in which a mode of ``FRAMED``, in force (B,), holds that is not read."""
+    return np.asarray((force != 0) & (force != READ))
+
 
 CHANGES = (Once.SHIFT, Once.LOCAL, Once.UNSHIFT, Once.SUSPEND, Once.RESTORE, Once.FRAME)
 
@@ -269,6 +278,13 @@ def blocks(source: Source, modal: Modal, control: Control, integers: IntegerWord
     return BlockWords(source, modal, control, columns, integers, 0, len(source.blocks))
 
 
+def _circles_back(words: BlockWords) -> Bools:
+    """(B,) blocks with G12 or G13, which end where they start."""
+    codes, mask = words.words(key("G")), np.zeros(len(words), np.bool_)
+    mask[codes.block[np.isin(codes.value, (12.0, 13.0))]] = words.control.increments
+    return mask
+
+
 def _targets(words: BlockWords) -> tuple[Bools, Floats, Bools]:
     """(B, 6) words that are targets, their values [m, rad], and those of them that are differences."""
     values = [words.lengths(axis) if i < 3 else words.angles(axis) for i, axis in enumerate(AXES)]
@@ -323,9 +339,9 @@ def frame_events(
             reason[rows] = reasons.number(why)
 
     def leave(where: Bools, rows: Bools, why: str) -> None:
-        """Leaves coordinates unknown before ``rows``, unless they set them."""
+        """Leaves coordinates unknown before ``rows``, unless they set them: those of ``where`` (B, 6) or (6,)."""
         if rows.any():
-            left[rows] |= where
+            left[rows] |= np.broadcast_to(where, (n, 6))[rows]
             reason[rows & (reason < 0)] = reasons.number(why)
 
     whole = np.ones(6, np.bool_)
@@ -348,6 +364,8 @@ def frame_events(
         parallel = words.beside
         both = np.concatenate([parallel, np.zeros((n, 3), np.bool_)], axis=1)
         lose(both, parallel.any(axis=1) & words.motion & ~home, What.PARALLEL)
+    # of a motion of the control without words of axes: holes on a circle (G70 I J L), a pocket (G150 P)
+    other |= modal.states & (move == Move.OTHER) & ~_circles_back(words)
     lose(whole, other | (words.motion & (np.abs(force[Group.MACRO]) == 1)), What.OTHER)
     if cycle.any():
         # Words of a cycle give where it works.
@@ -362,6 +380,9 @@ def frame_events(
         repeats = words.has(key("L")) | words.has(key("K"))
         lose(deep, cycle & ~at_level, What.CYCLE)
         lose(linear, cycle & (force[Group.PLANE] < 0), What.CYCLE)
+        # of a hole that runs no time it is not stated whether the tool goes there
+        none = (words.number(key("L")) == 0) | (words.number(key("K")) == 0)
+        lose(linear, cycle & none, What.CYCLE)
         lose(whole, cycle & repeats & (force[Group.DISTANCE] != 0), What.CYCLE)
     if (move < 0).any() and np.isin(words.source.column(key("G")).value, CYCLES).any():
         # perhaps a cycle, which ends elsewhere along the axis in which it works
@@ -384,12 +405,18 @@ def frame_events(
     if (apart := force[Group.OFFSET] < 0).any():
         # from one offset that is not known to another one
         leave(linear, apart & (flow.reason != FlowReason.NONE) & words.has(key("G")), What.BASE)
+    codes = words.words(key("G"))
+    mirrored = np.zeros(n, np.bool_)
+    mirrored[codes.block[np.isin(codes.value, MIRRORING)]] = True
+    mirrored &= force[Group.MIRRORED] == READ
     for group in FRAMED:
         if force[group].any() or modal.ahead[group]:
-            lose(whole, (force[group] != 0) & words.motion, What.FRAME)
-            leave(whole, modal.switched(group), What.FRAME)
+            lose(whole, framed(force[group]) & words.motion, What.FRAME)
+            leave(whole, modal.switched(group) & ~mirrored, What.FRAME)
+    leave(present, mirrored, What.FRAME)
     if force[Group.PLACED].any() or modal.ahead[Group.PLACED]:
-        leave(linear, modal.switched(Group.PLACED) | (modal.has(Once.FRAME) & words.control.iso), What.FRAME)
+        by_plane = modal.has(Once.FRAME) & words.control.iso & ~mirrored
+        leave(linear, modal.switched(Group.PLACED) | by_plane, What.FRAME)
     # With the rotary axes at 0 the words mean the same with and without a TCP mode.
     leave(linear, modal.switched(Group.TCP) & away, What.TIP)
     if lengths.any():

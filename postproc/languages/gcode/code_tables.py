@@ -5,7 +5,17 @@ from __future__ import annotations
 import math
 
 from postproc.languages.gcode import expression_values, general_lines, offsets
-from postproc.languages.gcode.control import UNKNOWN, Control, Feed, Group, ModalCode, Move, Once, modal_codes
+from postproc.languages.gcode.control import (
+    READ,
+    UNKNOWN,
+    Control,
+    Feed,
+    Group,
+    ModalCode,
+    Move,
+    Once,
+    modal_codes,
+)
 from postproc.languages.gcode.tilted_planes import with_planes
 
 COMMENT = rb"\((?:[^()\r\n]++|\([^()\r\n]*+\))*+\)?|;[^\r\n]*"
@@ -149,6 +159,7 @@ FANUC = Control(
         **_ARGUMENTS,
         **dict.fromkeys((680, 682), (ModalCode(Group.PLACED, 1),)),
         **dict.fromkeys((690, 691), (ModalCode(Group.TURNED, 0),)),
+        **dict.fromkeys((501, 511), (ModalCode(Group.MIRRORED, READ),)),  # along which axes, the frame states
     },
     codes={
         **_COMMON,
@@ -175,7 +186,7 @@ FANUC = Control(
                 (Group.DIAMETER, 1, (10.9,)),
                 (Group.FOREIGN, 1, (7, 51.2, 54.2, 54.4)),
                 (Group.FOREIGN, 1, (7.1, 107, 112, 12.1)),
-                (Group.ONCE, Once.FRAME, (68, 68.2, 53.1)),
+                (Group.ONCE, Once.FRAME, (68, 68.2, 53.1, 51.1, 50.1)),
                 (Group.PLACED, 0, (69, 69.1)),
                 (Group.FOREIGN, 0, (113, 13.1)),  # G113 only where such a mode is in force, see modal
             )

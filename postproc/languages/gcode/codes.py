@@ -97,7 +97,7 @@ CODES = define(
             meaning="The coordinates are rotated, scaled, mirrored, polar, or diameters.",
             consequence="Their place in the base is not followed, so the motion is not corrected.",
             action="Let the post-processor write coordinates of the base itself.",
-            example="`G51.1 X0`.",
+            example="`G51 P2.`.",
         ),
         "GCO011": Code(
             "info",

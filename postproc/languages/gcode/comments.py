@@ -12,6 +12,7 @@ from postproc.base.arrays import Bools, Ints
 from postproc.base.document import Document, Span
 from postproc.languages.core.comments_in_force import SPEAKS
 from postproc.languages.dialect import MARK
+from postproc.languages.gcode.comments_passed import CommentPassed, varying_comments
 from postproc.languages.gcode.execution import Execution
 from postproc.languages.gcode.execution_flow import ExecutionFlow, FlowReason
 from postproc.languages.gcode.source import Source
@@ -25,6 +26,7 @@ _HEAD = re.compile(
     re.I,
 )
 _EMPTY = re.compile(rb"[ \t\r]*+\n")
+_DELETED = re.compile(rb"[ \t]*+(?:N[ \t]*+\d++[ \t]*+)?/", re.I)
 
 
 class Remarks(NamedTuple):
@@ -49,65 +51,45 @@ def remarks(
         which, at = _passed(comments, execution.text.blocks.line, execution.order, execution)
         comments, rows = comments[which], np.searchsorted(steps, at)
     marker = _marker(raw, source.comments)
-    spans, lines = comments[:, :2], comments[:, 2]
-    alone = np.ones(0, np.bool_)
+    lines = comments[:, 2]
+    apart, alone = np.ones(0, np.bool_), np.ones(0, np.bool_)
     if len(lines):
-        alone = ~np.isin(lines, source.blocks.line[source.blocks.wordy])
-    speaking, others, conditional = [], [], []
-    for (start, stop), number, row, own, may_pass in zip(
-        spans.tolist(),
-        lines.tolist(),
-        rows.tolist(),
-        alone.tolist(),
-        _conditional(at, alone, execution, flow).tolist(),
-        strict=True,
+        apart = ~np.isin(lines, source.blocks.line[source.blocks.wordy])
+        alone = np.append(run, -1)[at] != lines
+    may_pass = _conditional(at, alone, execution, flow)
+    speaking, others, passed = [], [], []
+    for place, ((start, stop), row, own) in enumerate(
+        zip(comments[:, :2].tolist(), rows.tolist(), apart.tolist(), strict=True)
     ):
         said = _text(raw[start:stop])
         if marker is not None and start == marker.start:
             continue
+        one = Annotation(row, said, int(lines[place]))
         if SPEAKS.match(said):
-            speaking.append(Annotation(row, said, number))
-            conditional.append(may_pass)
+            sure = not may_pass[place] and not _slash(raw, start)
+            speaking.append(one)
+            passed.append(CommentPassed(one, int(at[place]), bool(alone[place]), sure))
         elif said and (own or meant_to_speak(said)):
-            others.append(Annotation(row, said, number))
+            others.append(one)
     first = head(raw)
-    varying = _varying(speaking, conditional, len(steps))
+    varying = varying_comments(passed, execution, flow)[steps]
     return Remarks(tuple(speaking), tuple(others), marker, Span(0, first, first), varying)
 
 
+def _slash(raw: bytes, start: int) -> bool:
+    """Whether the line of the comment at ``start`` begins with a slash: it may be passed over."""
+    return _DELETED.match(raw, raw.rfind(b"\n", 0, start) + 1, start) is not None
+
+
 def _conditional(at: Ints, alone: Bools, execution: Execution, flow: ExecutionFlow) -> Bools:
-    """(C,) comments, at steps ``at`` (C,), that the run may pass or not; alone (C,): no words are in their line."""
-    n = len(flow.reason)
-    uncertain = np.append(np.isin(flow.reason, (FlowReason.FLOW, FlowReason.DELETED)), False)
+    """(C,) comments, at steps ``at`` (C,), that the run may pass or not wherever it comes by; alone (C,): no block is
+    in their line."""
+    reason = np.append(flow.reason, FlowReason.NONE)
     if execution.followed:
-        edge = np.zeros(n + 2, np.int32)
-        np.add.at(edge, execution.perhaps[:, 0], 1)
-        np.add.at(edge, execution.perhaps[:, 1] + 1, -1)
-        before = np.cumsum(edge)[: n + 1] > 0
-    else:
-        inside = np.append(flow.reason == FlowReason.FLOW, False)
-        before = (inside & np.append(False, inside[:-1])) | np.append(flow.entered, False)
-    return np.asarray(np.where(alone, before[at], uncertain[at]))
-
-
-def _varying(speaking: list[Annotation], conditional: list[bool], count: int) -> Bools:
-    """(N,) see ``Remarks.varying``: behind a comment that may be passed or not, up to one that is."""
-    edge = np.zeros(count + 1, np.int32)
-    for word in ("FORCE", "COMPENSATE"):
-        since, said = -1, ""
-        for one, may_pass in zip(speaking, conditional, strict=True):
-            if not one.text.upper().startswith(word):
-                continue
-            if not may_pass:
-                if since >= 0:
-                    edge[since] += 1
-                    edge[one.row] -= 1
-                since, said = -1, one.text
-            elif since < 0 and one.text != said:
-                since = one.row
-        if since >= 0:
-            edge[since] += 1
-    return np.asarray(np.cumsum(edge)[:count] > 0)
+        return np.asarray(~alone & (reason[at] == FlowReason.DELETED))
+    inside = reason == FlowReason.FLOW
+    before = (inside & np.append(False, inside[:-1])) | np.append(flow.entered, False)
+    return np.asarray(np.where(alone, before[at], (inside | (reason == FlowReason.DELETED))[at]))
 
 
 def _text(comment: bytes) -> str:

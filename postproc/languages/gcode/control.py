@@ -32,7 +32,7 @@ class Group(IntEnum):
     LENGTHS = 12  # 0; else offsets that the program itself computes (G43.1)
     TURNED = 13  # 0; else rotated coordinates (G68)
     SCALED = 14  # 0; else scaled or mirrored coordinates
-    MIRRORED = 15
+    MIRRORED = 15  # READ where the frame has it
     POLAR = 16  # 0; else polar coordinates
     DIAMETER = 17  # 0; else X is a diameter
     SPINDLE = 18  # 0 speed, 1 constant surface speed: F per revolution is then unknown
@@ -98,6 +98,8 @@ class ModalCode(NamedTuple):
 
 UNKNOWN = -1
 """Value of a group that cannot be determined."""
+READ = 2
+"""Value of a group of modes in which words are no coordinates of the base, where the frame states what they are."""
 
 
 FIRST_NAME = 1000
@@ -148,8 +150,9 @@ class ToolAxis(IntEnum):
 class ProgrammedFrame:
     """Programmed coordinates in the base: base = turn @ xyz + shift[:3], and abc + shift[3:] for the rotary axes.
 
-    turn (3, 3); shift (6,) [m, rad], NaN where not known; memory: what the control itself remembers.  rotary (3,)
-    [rad]: where the block that starts it leaves the rotary axes, NaN where not known; None where they stay.
+    turn (3, 3): a rotation, also scaled or mirrored; shift (6,) [m, rad], NaN where not known; memory: what the
+    control itself remembers.  rotary (3,) [rad]: where the block that starts it leaves the rotary axes, NaN where not
+    known; None where they stay.
     """
 
     turn: Floats
@@ -168,12 +171,19 @@ class ProgrammedFrame:
     def from_base(self, position: Floats) -> Floats:
         """(..., 6) [m, rad]: a ``position`` (..., 6) in the base as it would be programmed."""
         moved = position - self.shift
-        return np.concatenate([self._turned(moved[..., :3], self.turn.T), moved[..., 3:]], -1)
+        back: Floats = self.turn.T if self.rigid else np.asarray(np.linalg.inv(self.turn), np.float64)
+        return np.concatenate([self._turned(moved[..., :3], back), moved[..., 3:]], -1)
+
+    @property
+    def rigid(self) -> bool:
+        """Coordinates are neither scaled nor mirrored."""
+        return bool(np.abs(self.turn @ self.turn.T - np.eye(3)).max() < 1e-9 and np.linalg.det(self.turn) > 0)
 
     @staticmethod
     def _turned(vector: Floats, turn: Floats) -> Floats:
         # Without a rotation an axis that is not known states nothing about the others.
-        return vector if np.array_equal(turn, np.eye(3)) else vector @ turn.T
+        along = np.diagonal(turn)
+        return vector * along if np.array_equal(turn, np.diag(along)) else vector @ turn.T
 
 
 def either_frame(one: ProgrammedFrame, other: ProgrammedFrame) -> ProgrammedFrame:

@@ -10,7 +10,8 @@ import numpy as np
 from postproc.base.arrays import Bools, Ints
 from postproc.base.byte_search import occurrences
 from postproc.base.document import Document
-from postproc.languages.gcode.blocks import AXES, FRAMED, BlockWords, Reasons, What
+from postproc.languages.gcode.block_arcs import unevenly_scaled
+from postproc.languages.gcode.blocks import AXES, FRAMED, BlockWords, Reasons, What, framed
 from postproc.languages.gcode.control import Feed, Group, Move, Once
 from postproc.languages.gcode.drill_cycles import refuse_cycles
 from postproc.languages.gcode.execution import Execution
@@ -153,7 +154,8 @@ def check_correctability(
     refuse(force[Group.ROUNDING] != 0, "GCO016", "RNDM is active, so the control rounds every corner")
     refuse(force[Group.AXIAL] != 0, "GCO016", "the axes move to the target independently (PTP)")
     for group, message in FRAMED.items():
-        refuse(force[group] != 0, "GCO010", f"the coordinates are {message}")
+        refuse(framed(force[group]), "GCO010", f"the coordinates are {message}")
+    _skewed(words, moves, where, collector)
     air = moves.kind == Kind.PTP
     refuse(
         air & (base < 0),
@@ -176,6 +178,25 @@ def check_correctability(
         "it is not known whether I J K are coordinates or differences",
     )
     refuse_rotary(words, moves, where, reasons, collector)
+
+
+def _skewed(words: BlockWords, moves: GcodeMotions, where: Positions, collector: RefusalCollector) -> None:
+    """Refuses motions in scaled or mirrored coordinates that need more than their places."""
+    rigid = np.array([frame.rigid for frame in where.frames])
+    if rigid.all():
+        return
+    rows, skewed = moves.block, ~rigid[where.frame[moves.block]]
+    turned = (words.modal.force[Group.TCP][rows] == 1) | (moves.tool_orientation.orient >= 0)
+    collector.refuse(
+        skewed & ((moves.move == Move.CYCLE) | words.has(*AXES[3:])[rows] | turned),
+        "GCO010",
+        "the coordinates are scaled or mirrored; what that makes of a cycle or of rotary axes is not read",
+    )
+    collector.refuse(
+        _is_arc(moves.move) & unevenly_scaled(words, rows, moves.plane, where),
+        "GCO010",
+        "the axes of the arc are scaled by different factors",
+    )
 
 
 def _offsets_lost(words: BlockWords, blocks: Ints, rows: Ints, collector: RefusalCollector) -> None:

@@ -63,7 +63,8 @@ class Execution:
     the step calls a subprogram that is followed.  entered (E,): a jump leads to the block.  repeated (E,): the
     block runs in other steps as well.  arrivals (J,): steps that a jump leads to, past what is written before their
     block; reached (R, 2): steps before which the run comes to a block that does not run then, and that block.
-    perhaps (P, 2): first and last step of what is written before their blocks and may be passed or not.
+    perhaps (P, 4): first and last step of what is written before their blocks and may be passed or not, the number of
+    the branch or loop that it is a part of, and what else is known of it (STRAIGHT, ONE_ARM_RUNS).
     folded: the words whose values are put in.  unknown: names whose value was
     wanted and is not known, and the block where it was first.  missing: names of programs that are called and are not
     in the text."""
@@ -82,7 +83,7 @@ class Execution:
     missing: frozenset[str] = frozenset()
     arrivals: Ints = field(default_factory=lambda: np.empty(0, np.int64))
     reached: Ints = field(default_factory=lambda: np.empty((0, 2), np.int64))
-    perhaps: Ints = field(default_factory=lambda: np.empty((0, 2), np.int64))
+    perhaps: Ints = field(default_factory=lambda: np.empty((0, 4), np.int64))
 
 
 def execute(
@@ -209,5 +210,5 @@ def _result(run: RunFlow, stop: int, followed: bool, own: int | None = None) -> 
         frozenset(run.missing),
         np.array(run.jumped, np.int64),
         np.array(run.reached, np.int64).reshape(-1, 2),
-        np.array(run.conditional, np.int64).reshape(-1, 2),
+        np.array(run.conditional, np.int64).reshape(-1, 4),
     )

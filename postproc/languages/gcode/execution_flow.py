@@ -22,6 +22,9 @@ LOCAL = 97
 RETURNS = (99,)
 
 
+STRAIGHT, ONE_ARM_RUNS = 1, 2
+"""Of what may be passed or not: nothing in it goes elsewhere; it is an arm of a branch of which one surely runs."""
+
 _ENDS = (2, 17, 30, *RETURNS)
 
 

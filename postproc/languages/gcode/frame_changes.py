@@ -11,7 +11,7 @@ import numpy as np
 from postproc.base.arrays import Floats, Ints
 from postproc.base.units import MM
 from postproc.languages.gcode.blocks import AXES, SMALL_ANGLE, BlockWords
-from postproc.languages.gcode.control import Event, Group, Once, ProgrammedFrame, either_frame
+from postproc.languages.gcode.control import READ, Event, Group, Once, ProgrammedFrame, either_frame
 from postproc.languages.gcode.lexing import FARTHEST
 from postproc.languages.gcode.words import How, Note, key
 
@@ -23,9 +23,9 @@ def frame_blocks(words: BlockWords) -> Ints:
     """(K,) the blocks that change the frame: G92 and G52 only with coordinates."""
     mentioned = words.has(*(key(letter) for letter in "XYZABC"))
     always = words.modal.has(Once.UNSHIFT, Once.SUSPEND, Once.RESTORE, Once.FRAME)
-    placed = words.modal.force[Group.PLACED]
+    placed = (words.modal.force[Group.PLACED] != 0) | (words.modal.force[Group.MIRRORED] == READ)
     if placed.any():
-        always |= words.modal.switched(Group.PLACED) | (words.modal.switched(Group.OFFSET) & (placed != 0))
+        always |= words.modal.switched(Group.PLACED) | (words.modal.switched(Group.OFFSET) & placed)
     return np.flatnonzero(
         (always | (words.modal.has(Once.SHIFT, Once.LOCAL) & mentioned)) & words.modal.flow.tape
     )

@@ -55,10 +55,11 @@ class GcodeMotions:
         # A mirrored frame turns the sense of a rotation about a mirrored axis.
         sense = np.sign(np.linalg.det(turn))[:, None]
         normal = (turn @ arcs.normal[..., None])[..., 0] * sense
-        step = end[:, :3] - start[:, :3]
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        step = (turn @ (end[:, :3] - start[:, :3])[..., None])[..., 0]
         is_arc = np.isfinite(arcs.sweep)
-        along = np.einsum("ij,ij->i", step, np.where(is_arc[:, None], arcs.normal, 0.0))
-        radius = np.linalg.norm(start[:, :3] - arcs.centre, axis=1)
+        along = np.einsum("ij,ij->i", step, np.where(is_arc[:, None], normal, 0.0))
+        radius = np.linalg.norm((turn @ (start[:, :3] - arcs.centre)[..., None])[..., 0], axis=1)
         length = np.where(is_arc, np.hypot(radius * arcs.sweep, along), np.linalg.norm(step, axis=1))
         return GcodeMotions(
             block,

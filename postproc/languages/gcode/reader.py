@@ -18,7 +18,7 @@ from postproc.base.units import DEG, MM
 from postproc.languages.core.comments_in_force import CONTRADICTED
 from postproc.languages.dialect import PLAIN, Program, ReadingSettings
 from postproc.languages.gcode import offsets
-from postproc.languages.gcode.block_arcs import arcs_of_blocks, given_by_point
+from postproc.languages.gcode.block_arcs import arcs_of_blocks, given_by_point, unevenly_scaled
 from postproc.languages.gcode.blocks import (
     AXES,
     BlockWords,
@@ -405,6 +405,7 @@ def _motions(
     force, move = words.modal.force, words.move[rows]
     plane = force[Group.PLANE][rows]
     is_arc = np.isin(move, (Move.CLOCKWISE, Move.COUNTER, Move.THROUGH)) & ~words.machine[rows]
+    is_arc &= ~unevenly_scaled(words, rows, plane, where)
     desired_path = arcs_of_blocks(words, rows, start, end, plane, is_arc)
     kind = KINDS[move]
     kind[words.modal.has(Once.HOME)[rows]] = Kind.PTP

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
+from itertools import pairwise
 
+from postproc.languages.gcode.execution_flow import ONE_ARM_RUNS, STRAIGHT
 from postproc.languages.gcode.run_calls import RunCalls
 from postproc.languages.gcode.statements import Construct, FlowStatement, NotFollowed, Verb
 
@@ -208,9 +210,20 @@ class RunFlow(RunCalls):
         """A construct that may run or not, once or often."""
         self.escape(around.start, around.stop + 1)
         self.kill(around.start, around.stop + 1)
-        self.conditional.append((self.count + 1, self.count + around.stop - around.start))
+        arms = [block for block, _ in around.arms] if around.verb == Verb.IF else [around.start]
+        one_runs = around.verb == Verb.IF and len(arms) > 1 and not around.arms[-1][1]
+        self.passed_or_not([*arms, around.stop], one_runs)
         self.perhaps_range(around.start, around.stop + 1)
         return around.stop + 1
+
+    def passed_or_not(self, bounds: list[int], one_runs: bool) -> None:
+        """Notes what is between blocks, the first of which is the next to run, as parts of which one runs or none."""
+        first, group = self.count - bounds[0], self.count
+        for start, stop in pairwise(bounds):
+            low, high = bisect_left(self.special, start + 1), bisect_left(self.special, stop)
+            straight = not any(block in self.shape.statements for block in self.special[low:high])
+            kind = STRAIGHT * straight + ONE_ARM_RUNS * one_runs
+            self.conditional.append((first + start + 1, first + stop, group, kind))
 
     def perhaps_range(self, start: int, stop: int) -> None:
         low, high = bisect_left(self.special, start), bisect_left(self.special, stop)
@@ -299,7 +312,7 @@ class RunFlow(RunCalls):
         if self.labels.between(start, stop):
             raise NotFollowed
         self.kill(start, stop)
-        self.conditional.append((self.count + 1, self.count + stop - start))
+        self.passed_or_not([start, stop], False)
         self.emit(start, start + 1)
         self.perhaps_range(start + 1, stop)
         self.entered.append(self.count)

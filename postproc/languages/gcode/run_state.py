@@ -87,8 +87,7 @@ class RunState:
         self.called: list[int] = []
         self.entered: list[int] = []
         self.jumped: list[int] = []  # steps that are reached by a jump, past what is written before them
-        # first and last step of what may be passed or not
-        self.conditional: list[tuple[int, int]] = []
+        self.conditional: list[tuple[int, int, int, int]] = []  # as of ``Execution.perhaps``
         # steps before which the run comes to a block that is none of it
         self.reached: list[tuple[int, int]] = []
         self.unknown: dict[str, int] = {}

@@ -163,8 +163,9 @@ _NORMAL = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 def frame(event: Event) -> ProgrammedFrame:
     """The programmable frame after TRANS, ROT ...: absolute ones take the place of the whole frame, A... ones go
     on from it.  ROT X Y Z turns about Z, the new Y, the new X; RPL= about the axis normal to the plane.  CYCLE800
-    without a plane leaves no frame.  Scales, mirrors and frames that come from the machine are not read: where they
-    are in force the place is not known."""
+    without a plane leaves no frame.  SCALE multiplies and MIRROR reverses the coordinates of the axes that they name.
+    Frames that come from the machine, and rotations of scaled or mirrored coordinates, are not read: where they are in
+    force the place is not known."""
     unknown = ProgrammedFrame(np.eye(3), np.full(6, np.nan), event.frame.memory)
     if event.frame.memory is None and _ALONG_TOOL.intersection(event.codes):
         return replace(unknown, memory=_ORIENTED)
@@ -187,7 +188,15 @@ def frame(event: Event) -> ProgrammedFrame:
     if name.endswith("TRANS"):
         shift = given * np.array([event.scale] * 3 + [DEG] * 3)
         return replace(base, shift=base.shift + np.concatenate([base.turn @ shift[:3], shift[3:]]))
-    if not name.endswith("ROT"):
+    if name.endswith(("SCALE", "MIRROR")):
+        factors = np.array([event.words.get(axis, 1.0) for axis in _AXES[:3]])
+        if name.endswith("MIRROR"):
+            factors = np.array([-1.0 if axis in event.words else 1.0 for axis in _AXES[:3]])
+        elif not (np.isfinite(factors) & (factors > 0)).all():
+            return unknown
+        strange = {*_AXES[3:], RPL} & set(event.words)
+        return unknown if strange else replace(base, turn=base.turn @ np.diag(factors))
+    if not base.rigid or not name.endswith("ROT"):
         return unknown
     angle = event.words.get(RPL)
     turn = rotation_from_abc(given[[2, 1, 0]] * DEG)

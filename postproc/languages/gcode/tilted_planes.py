@@ -1,10 +1,13 @@
-"""Planes that a program states: G68 and G68.2 of a Fanuc, and swivelled planes of a Sinumerik (CYCLE800).
+"""Planes that a program states: G68 and G68.2 of a Fanuc, and swivelled planes of a Sinumerik (CYCLE800); mirrors of a
+Fanuc (G51.1).
 
 G68 turns the coordinates about the axis normal to the plane, at a centre, and leaves the tool as it is.  G68.2 states
 the origin of a plane and its angles I J K about Z, the new X and the new Z; G53.1 then brings the tool along its Z.
 CYCLE800 turns axis by axis, in the order that its mode states, and brings the tool along Z.  The tool's spin about its
 axis is then the machine's: the tool is turned from its orientation in the cell by the least angle, as where a vector
 states its direction.  Centres that are not stated, steps (G91), and what the control's parameters decide are not read.
+G51.1 mirrors the axes that it names at the coordinates that it states, and G50.1 ends that of those that it names; the
+two are read without another frame in between.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ from postproc.base.units import DEG
 from postproc.languages.gcode.control import Event, ProgrammedFrame, ToolAxis
 from postproc.languages.gcode.words import key
 
+MIRRORED, UNMIRRORED = (51.1,), (50.1,)
 ROTATED, TILTED, ALIGNED, ENDED = (68.0,), (68.2,), (53.1,), (69.0, 69.1)
 _LENGTHS = tuple(key(letter) for letter in "XYZ")
 _ANGLES = tuple(key(letter) for letter in "IJK")
@@ -38,12 +42,25 @@ class PlaneMemory(NamedTuple):
     tilted: bool
 
 
+class MirrorMemory(NamedTuple):
+    """What a mirrored frame remembers: the frame before it; centres [m] of the mirrored axes, NaN of the others."""
+
+    before: ProgrammedFrame
+    centres: tuple[float, ...]
+
+
 def with_planes(shifts: Callable[[Event], ProgrammedFrame]) -> Callable[[Event], ProgrammedFrame]:
     """The frame after a block of a Fanuc; ``shifts`` gives that after G52, G92 and G92.1."""
 
     def frame(event: Event) -> ProgrammedFrame:
         placed = event.frame.memory if isinstance(event.frame.memory, PlaneMemory) else None
         codes = set(event.codes)
+        mirror = event.frame.memory if isinstance(event.frame.memory, MirrorMemory) else None
+        if codes.intersection((*MIRRORED, *UNMIRRORED)):
+            return _mirrored(event, mirror, placed is None)
+        if mirror is not None and not codes.intersection(ENDED):
+            lost = _unknown(mirror.before) if event.once else mirror.before
+            return replace(_unknown(event.frame), memory=MirrorMemory(lost, mirror.centres))
         if codes.intersection(ENDED):
             return event.frame if placed is None else _ended(event.frame, placed)
         if codes.intersection(ALIGNED):
@@ -57,10 +74,34 @@ def with_planes(shifts: Callable[[Event], ProgrammedFrame]) -> Callable[[Event],
                 return replace(_unknown(event.frame), memory=memory)
             return replace(_tilted(event) if tilted else _rotated(event), memory=memory)
         if placed is not None:
-            return _unknown(event.frame)  # another origin, or another work offset, under the plane
+            # another origin, or another work offset, under the plane
+            stays = PlaneMemory(_unknown(placed.before), placed.tilted) if event.once else placed
+            return replace(_unknown(event.frame), memory=stays)
         return shifts(event) if event.once else event.frame
 
     return frame
+
+
+def _mirrored(event: Event, mirror: MirrorMemory | None, alone: bool) -> ProgrammedFrame:
+    """G51.1 X Y Z and G50.1 X Y Z; alone: no plane is in force."""
+    before = event.frame if mirror is None else mirror.before
+    centres = np.full(3, np.nan) if mirror is None else np.array(mirror.centres)
+    named = np.array([one in event.words for one in _LENGTHS])
+    begins = bool(set(event.codes).intersection(MIRRORED))
+    if not begins and mirror is None and alone:
+        return event.frame
+    values = _lengths(event, centres)
+    strange = {key(letter) for letter in "ABCIJKPQR"} & set(event.words)
+    if not alone or strange or not event.absolute or not named.any() or not np.isfinite(values[named]).all():
+        return replace(_unknown(event.frame), memory=MirrorMemory(_unknown(before), tuple(centres.tolist())))
+    if begins and set(event.codes).intersection(UNMIRRORED):
+        return replace(_unknown(event.frame), memory=MirrorMemory(_unknown(before), tuple(centres.tolist())))
+    centres = np.where(named, values if begins else np.nan, centres)
+    turned = np.isfinite(centres)
+    if not turned.any():
+        return replace(before, rotary=None)
+    frame = _moved(before, np.diag(np.where(turned, -1.0, 1.0)), 2.0 * np.nan_to_num(centres))
+    return replace(frame, memory=MirrorMemory(before, tuple(centres.tolist())))
 
 
 def _unknown(frame: ProgrammedFrame) -> ProgrammedFrame:

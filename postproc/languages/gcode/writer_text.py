@@ -129,8 +129,10 @@ def _least(places: SourceMapPart, orient: Ints, writing: WritingSettings) -> Int
     """(N, 10) the least decimals: those of which a step in the program's unit is no more than one of mm; one more in
     turned coordinates, whose roundings add up in the base."""
     rotation = np.abs(places.frames.rotation)
-    turned = np.any(np.minimum(rotation, np.abs(rotation - 1.0)) > 1e-9, axis=(1, 2))
-    finer = np.ceil(np.log10(np.nan_to_num(places.scale / MM, nan=1.0)) - 1e-9).astype(np.int64)
+    factor = np.linalg.norm(places.frames.rotation, axis=1).max(axis=1)
+    turned = np.any(np.minimum(rotation, np.abs(rotation - factor[:, None, None])) > 1e-9, axis=(1, 2))
+    unit = places.scale * factor[places.frame]
+    finer = np.ceil(np.log10(np.nan_to_num(unit / MM, nan=1.0)) - 1e-9).astype(np.int64)
     lengths = writing.mm + finer + turned[places.frame]
     least = np.repeat(lengths[:, None], COLUMNS, axis=1)
     angles = np.array(
