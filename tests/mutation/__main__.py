@@ -1,4 +1,4 @@
-"""python -m tests.mutation FOLDER [--room R ...] [--sample N] [--seed S] [--seconds T] [--tier all] [--revision REV]"""
+"""python -m tests.mutation FOLDER [--room R ...] [--sample N] [--seed S] [--seconds T] [--tier all] [--confirm T] [--revision REV]"""
 
 import os
 import sys
