@@ -265,6 +265,8 @@ def _entry(found: re.Match[bytes]) -> bytes | None:
 def effects_of(statement: Statement, known: Directions = MappingProxyType({})) -> tuple[Effects, bytes]:
     """What a statement (no motion, no block) may change, and the routine it calls."""
     said = statement.strings
+    if statement.kind == StatementKind.UMLAUT_NAME and not isinstance(said, Call):
+        return effects_of_unknown(statement.code), b""
     if isinstance(said, Assignment):
         if said.name == b"$VEL" and said.path not in (b"", b"CP"):
             return set(), b""
