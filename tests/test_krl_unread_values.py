@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -69,3 +70,24 @@ def test_a_name_that_is_no_krl_leaves_no_other_name_of_its_line_known(line: str,
     assert in_force(known + line.replace("@", name) + "\n" + used)["base"] in ("?", "{9 0 0 0 0 0}")
     apart = line.replace("@", name).replace("MINE", "THAT") + "\n"
     assert in_force(known + apart + used)["base"] in ("?", in_force(known + used)["base"])
+
+
+WORDS = re.findall(
+    r"\w+",
+    "IF THEN ELSE ENDIF FOR ENDFOR WHILE ENDWHILE REPEAT UNTIL LOOP ENDLOOP SWITCH CASE DEFAULT ENDSWITCH GOTO RETURN "
+    "EXIT HALT WAIT PTP LIN CIRC SPLINE ENDSPLINE END DECL CONTINUE INTERRUPT TRIGGER RESUME",
+)
+"""Key words of the manual of the system's integrator."""
+
+
+@pytest.mark.parametrize("line", ["@=5", "@.X=5", "DECL INT @", "INT @", "DECL INT n,@"])
+def test_a_key_word_is_no_name(line: str) -> None:
+    """Who writes it meant another line: the one that is there is found."""
+    taken = []
+    for word in WORDS:
+        text = f"DEF part()\nBAS(#BASE,1)\nBAS(#TOOL,1)\n{line.replace('@', word)}\n{TARGET}END\n"
+        found = KrlDialect().read((Document(Path("part.src"), text.encode()),))
+        findings = [*found.findings, *found.toolpath.constraints.refused.values()]
+        if 4 not in [finding.line for finding in findings]:
+            taken.append(word)
+    assert taken == []
