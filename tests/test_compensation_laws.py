@@ -13,7 +13,7 @@ from test_mirror import CARRIES, FORCE, TOOL, Problem, full, program_angles, tas
 
 from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.compensation.axis_limits import check_limits
-from postproc.compensation.correct import correct, with_residual
+from postproc.compensation.correct import MotionOutcome, as_air, correct, with_residual
 from postproc.compensation.desired_path import start_poses
 from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import pose_error, predict
@@ -267,6 +267,25 @@ def test_never_more_motions_than_may_be(growth):
             f"({growth:g}) allows {int(growth * len(job.toolpath)) - len(job.toolpath)}:" in finding.message
         )
         assert finding.line in job.toolpath.line
+
+
+@pytest.mark.parametrize("taken", [[], [0], [1, 3]])
+def test_what_is_taken_for_air_is_in_no_cut_and_nothing_else_changes(taken):
+    """Nothing is predicted of it, nothing corrected; a motion is in a cut, or in air."""
+    result = correct(task())
+    rows, n = np.flatnonzero(result.scope)[taken], len(result.state)
+    found = as_air(result, rows)
+    others = np.setdiff1d(np.arange(n), rows)
+    for name in ("state", "cut", "correction", "turn", "deflection", "before", "after", "after_angle"):
+        np.testing.assert_array_equal(getattr(found, name)[others], getattr(result, name)[others])
+    assert not found.scope[rows].any()
+    assert not found.corrected[rows].any()
+    assert not found.correction[rows].any()
+    assert not found.turn[rows].any()
+    assert np.isnan(found.before[rows]).all()
+    assert np.isnan(found.after[rows]).all()
+    for one in (result, found):
+        np.testing.assert_array_equal(one.scope, one.state != MotionOutcome.AIR)
 
 
 # Where the correction begins anew

@@ -10,6 +10,7 @@ from path_cases import task
 from scipy.spatial.transform import Rotation
 
 from postproc.base.geometry import Poses
+from postproc.compensation import corner_fit
 from postproc.compensation.corner_fit import corners_not_improved, fit_corners
 from postproc.compensation.corners import compare_corners, evaluate_corners, rounded_errors
 from postproc.compensation.correct import correct
@@ -149,6 +150,35 @@ def test_a_fitted_corner_changes_its_correction_as_fast_as_its_force_asks() -> N
     assert fastest > 0.1
     moves = evaluate_transitions(job, fitted, division)
     assert moves.rate == pytest.approx(fastest, rel=0.02)
+
+
+def test_corners_are_fitted_each_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In whatever blocks: a zigzag of several corners has the same points with one of them in a block."""
+    sides = np.array([[0.0, 0.1, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]])
+    points = [
+        np.array([1.5, -0.2, 0.55]),
+        *(np.array([1.5, -0.2, 0.5]) + np.cumsum([0.0 * sides[0], *sides], axis=0)),
+    ]
+    wrench = np.zeros((5, 6))
+    wrench[2:, :3] = [Rotation.from_rotvec([0.0, 0.0, k % 2 * np.pi / 2]).apply(ALONG) for k in range(3)]
+    on = np.arange(5) >= 2
+    job = task(
+        points,
+        on.tolist(),
+        wrench=wrench,
+        kind=[Kind.PTP] + [Kind.LIN] * 4,
+        approximation=np.where(on, 0.5e-3, 0.0),
+    )
+    job = add_force_ramps(replace(job, force=replace(job.force, steps=on)), 5e-3)
+    result = correct(job)
+    plain = subdivide(job, result, FREE)
+    together = fit_corners(job, result, plain, FREE)[1]
+    monkeypatch.setattr(corner_fit, "BLOCK", 1)
+    alone = fit_corners(job, result, plain, FREE)[1]
+    assert together.fits is not None
+    assert len(np.unique(together.source[together.fits.point])) > 1
+    np.testing.assert_array_equal(alone.source, together.source)
+    np.testing.assert_allclose(alone.command.position, together.command.position, atol=1e-9)
 
 
 def test_straight_on_where_the_force_steps_there_is_a_corner() -> None:

@@ -165,6 +165,18 @@ def test_no_level_is_claimed_behind_what_leads_elsewhere(control: str, block: st
 
 
 @CONTROLS
+@pytest.mark.parametrize("code", ["G0", "G1"])
+@pytest.mark.parametrize("by", [3.0, -3.0, 30.0])
+def test_a_level_behind_a_difference_is_no_coordinate(control: str, code: str, by: float) -> None:
+    """It is by so much away from the last coordinate, or not claimed; before the first hole, and behind the last."""
+    between = f"G91 {code} Z{by:.1f}\nG90"
+    for at, level in ((1, 20.0 + by), (3, 20.0), (5, 20.0 + by)):
+        for end in run(control, with_block(between, at))[-2:]:
+            place = end.rstrip("*").split(" ")
+            assert place[-1] in ("?", f"{level:g}", f"{20.0 + by:g}"), (at, end)
+
+
+@CONTROLS
 def test_a_level_is_no_number_of_another_unit(control: str) -> None:
     """LinuxCNC goes back to the number that R or the level had, in the unit that is in force."""
     for back in ("G98", "G99"):

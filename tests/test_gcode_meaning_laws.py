@@ -168,3 +168,16 @@ def test_a_work_offset_behind_other_settings_is_stated() -> None:
         pose = path.frames[path.base[-1]].pose
         assert pose is not None
         np.testing.assert_allclose(pose.position * 1e3, [10, 20, 30])
+
+
+SETTINGS_OF_PRINTERS = [
+    *(92, 201, 203, 205, 206, 218, 425, 665, 666, 851, 906, 907, 913, 914),  # Marlin
+    *(208, 350, 557, 558, 566, 569, 574, 669),  # RepRapFirmware
+]
+"""M codes whose X Y Z are figures of the machine, by the documents of two printers."""
+
+
+@pytest.mark.parametrize("control", ["linuxcnc", "fanuc"])
+def test_figures_of_a_machine_are_no_place_to_go_to(control: str) -> None:
+    for code in SETTINGS_OF_PRINTERS:
+        assert run(control, f"G1 X1 Y2 Z3\nM{code} X100 Y5\nG1 X2\n") == ["1 2 3", "2 2 3"], code

@@ -13,7 +13,7 @@ from fuzz.examine import dividable, movable, planned
 from postproc.base.document import Document
 from postproc.base.units import MM
 from postproc.languages.dialect import Plan, Program, ReadingSettings, WritingSettings
-from postproc.languages.krl import KrlDialect
+from postproc.languages.krl import KrlDialect, block_flow, open_blocks, program_flow
 
 KRL = KrlDialect()
 CASES = Path(__file__).parent / "programs" / "krl"
@@ -234,3 +234,53 @@ def test_an_exit_ends_no_loop_of_the_caller() -> None:
         f"DEF part()\n{FRAMES}DECL INT i\nFOR i=1 TO 3\nsub()\nENDFOR\nEND\nDEF sub()\nEXIT\n{LINE}END\n"
     )
     assert path.toolpath.line.tolist() == [11, 11, 11]
+
+
+FIELDS = ("base ", "tool ")
+
+
+def known(program: Program) -> dict[int, set[tuple[str, ...]]]:
+    """Line -> the frames and positions of its rows, as far as they are known."""
+    found: dict[int, set[tuple[str, ...]]] = {}
+    path = program.toolpath
+    for row, text in enumerate(path.dump()):
+        words = [text.partition(name)[2].split(" tool ")[0].split(" ")[0] for name in FIELDS]
+        if row not in path.constraints.refused:
+            words += np.round(path.position[row], 6).astype(str).tolist()
+        found.setdefault(int(path.line[row]), set()).update(enumerate(words))
+    return found
+
+
+BLOCKS = (
+    "GOTO IN\nLOOP\nBAS(#BASE,3)\nIN:\nLIN {X 1,Y 0,Z 0,A 0,B 0,C 0}\nIF $IN[1] THEN\nEXIT\nENDIF\nENDLOOP\n",
+    "GOTO IN\nWHILE $IN[2]\nn=n+1\nIN:\nBAS(#TOOL,n)\nLIN {X 2,Y 0,Z 0,A 0,B 0,C 0}\nENDWHILE\n",
+    "FOR n=1 TO 3\nBAS(#BASE,n)\nLIN {X n,Y 0,Z 0,A 0,B 0,C 0}\nENDFOR\nBAS(#BASE,n)\n",
+    "REPEAT\nLIN {X 1,Y 0,Z 0,A 0,B 0,C 0}\nIF $IN[1] THEN\nGOTO OUT\nENDIF\nBAS(#TOOL,2)\nUNTIL $IN[2]\nOUT:\n",
+    "n=1\nLOOP\nn=n+1\nIF n>4 THEN\nEXIT\nENDIF\nBAS(#TOOL,n)\nLIN {X n,Y 0,Z 0,A 0,B 0,C 0}\nENDLOOP\n",
+)
+
+
+@pytest.mark.parametrize("limit", [0, 5, 20])
+@pytest.mark.parametrize("name", ["BUDGET", "MOST_STEPS"])
+def test_who_follows_less_knows_less_and_nothing_else(
+    name: str, limit: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of every two blocks behind and within each other: what is still known is what is known with all steps."""
+    last = "LIN {X 9,Y 0,Z 0,A 0,B 0,C 0}\n"
+    behind = [
+        block.replace("IN\n", "HERE\n").replace("IN:", "HERE:").replace("OUT", "THERE") for block in BLOCKS
+    ]
+    texts = [f"DECL INT n\nn=1\n{one}{last}{other}{last}" for one in BLOCKS for other in behind]
+    texts += [f"DECL INT n\nn=1\nLOOP\n{one}ENDLOOP\n{last}" for one in BLOCKS]
+    whole = [known(body(text)) for text in texts]
+    for module in (block_flow, open_blocks, program_flow):
+        if hasattr(module, name):
+            monkeypatch.setattr(module, name, limit - 50 * (name == "MOST_STEPS"))
+    fewer = 0
+    for text, every in zip(texts, whole, strict=True):
+        less = known(body(text))
+        for line, words in less.items():
+            unknown = {word for word in words if word[1] in ("?", "nan")}
+            assert words - unknown <= every[line], text
+            fewer += bool(unknown - every[line])
+    assert fewer or (name, limit) != ("BUDGET", 0)

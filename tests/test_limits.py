@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from path_cases import START, TOOL, corner, line
 
+from postproc.base import batches
 from postproc.compensation.axis_limits import check_limits
 from postproc.compensation.correct import correct
 from postproc.compensation.subdivide import subdivide
@@ -82,6 +83,29 @@ def test_the_motion_that_is_too_fast_is_the_one_that_is_told():
     result = correct(slow)
     found, _ = check_limits(slow, subdivide(slow, result, Limits(no_insert=True)))
     assert [(finding.code, finding.line) for finding in found] == [("KIN009", path.line[3])]
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3])
+def test_the_worst_of_all_motions_is_found_in_whatever_blocks_they_are(rows, monkeypatch):
+    """The nearest to a limit and the fastest, of motions that differ in their feed."""
+    task = corner()
+    robot, path = task.model.robot, task.toolpath
+    axes = tuple(replace(axis, speed=np.radians(0.05 * (k + 1))) for k, axis in enumerate(robot.axes))
+    task = replace(task, model=replace(task.model, robot=replace(robot, axes=axes)))
+    division = subdivide(task, correct(task), Limits(max_growth=100.0))
+    low, high = task.model.robot.limits.T.copy()
+    high[0] = task.track.q[:, 0].max() + np.radians(0.5)
+    low[0] = task.track.q[:, 0].min() - np.radians(0.5)
+    told = []
+    for sense in (1, -1):
+        feed = 0.01 + 1e-4 * sense * np.arange(len(path))
+        job = with_limits(replace(task, toolpath=path.with_columns(feed=feed)), low, high)
+        whole = check_limits(job, division)
+        with monkeypatch.context() as patch:
+            patch.setattr(batches, "ROWS", rows)
+            assert check_limits(job, division) == whole
+        told += [finding.code for finding in whole[0]]
+    assert told.count("KIN009") == 2
 
 
 def test_a_posture_that_only_the_correction_makes_singular():

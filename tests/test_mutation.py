@@ -5,9 +5,10 @@ import pytest
 pytest.importorskip("cosmic_ray", reason="pip install .[mutation]")
 
 from mutation import judging, stream
-from mutation.command import changed, judge, row, wilson
+from mutation.command import Drawn, changed, confirm, judge, meet, row, wilson
 from mutation.mutants import mutants, sample
 from mutation.probes import NOTE, Probes, with_probes
+from mutation.second_stage import further_tests
 
 SOURCE = '''\
 """A document of 3 words."""
@@ -228,6 +229,82 @@ def test_quick_tests_and_those_that_killed_come_first():
         seen.add({"mutant": number, "verdict": "killed", "test": "a"})
     assert list(seen.choice(0, 1.2)) == ["a"]
     assert list(seen.choice(0, 0.1)) == ["a"]
+
+
+class Item:
+    """A test as pytest has it, by name; a slow one ends with "slow"."""
+
+    def __init__(self, nodeid: str) -> None:
+        self.nodeid = nodeid
+
+    def get_closest_marker(self, name: str) -> str | None:
+        return name if self.nodeid.endswith(name) else None
+
+
+def test_survivors_meet_what_may_come_by_them_fast_tests_first():
+    seen = stream.Stream(
+        seconds={"a::1": 1.0, "a::2": 1.0, "b::1": 1.0}, reached={0: ["a::1"], 1: ["a::2"], 2: ["b::1"]}
+    )
+    names = ["z::1", "c::slow", "c::1", "b::slow", "b::1", "a::slow", "a::2", "a::1"]
+    further = further_tests(seen, [0], ["b", "c"], 5.0)
+    order = [item.nodeid for item in further.in_order([Item(name) for name in names])]
+    assert order == ["a::1", "c::1", "z::1", "a::slow", "c::slow", "b::slow"]
+    assert (further.each, further.all) == (5.0, 5.0)
+    assert further_tests(seen, [0, 1], [], 5.0).all == 10.0
+
+
+LEFT_OUT = """\
+import pytest
+from thing import Thing, grown
+
+def test_left_out():
+    assert grown(Thing(3), 2.0) == 5.0
+
+@pytest.mark.slow
+def test_slow():
+    assert grown(None) == -1.0
+
+def test_ever():
+    while True:
+        pass
+"""
+
+
+@pytest.mark.slow
+def test_what_lived_only_for_want_of_a_test_falls_in_the_second_stage(tree, tmp_path):
+    """Of a file left out of the first stage, or of the slow tier; what hangs, unmutated, takes its seconds and is
+    no test; what no test sees lives on."""
+    quick = "from thing import grown\n\ndef test_quick():\n    assert grown(None) < 0\n"
+    (tree / "tests" / "test_thing.py").write_text(quick)
+    (tree / "tests" / "test_more.py").write_text(LEFT_OUT)
+    judging.warm(judging.FAST)
+    chosen = [
+        Drawn("room", one, text, *changed(SOURCE, text))
+        for one in mutants(tree, "thing.py")
+        if one.line in (15, 16, 17) and (text := one.text(SOURCE)) is not None
+    ]
+    first = meet(
+        tmp_path, tree, chosen, ["tests/test_thing.py"], tmp_path / "stream.jsonl", 9.0, judging.FAST
+    )
+    results = [{"verdict": first.verdicts[k][0], "test": "", "tests": 1} for k in range(len(chosen))]
+
+    def verdicts() -> dict[str, str]:
+        pairs = zip(chosen, results, strict=True)
+        return {one.after.replace(" ", ""): str(result["verdict"]) for one, result in pairs}
+
+    before = verdicts()
+    assert before["return-2.0"] == "survived"
+    assert before["returnthing.size-by*len(list(pairs))"] == "not reached"
+    assert before["return+1.0"] == "killed"
+    confirm(tmp_path, tree, chosen, first, ["thing"], 1.0, results)
+    after = verdicts()
+    assert after["return-2.0"] == after["returnthing.size-by*len(list(pairs))"] == "killed"
+    assert {one["test"].split("::")[1] for one in results if one["test"]} == {"test_left_out", "test_slow"}
+    assert all(after[word] == "killed" for word, verdict in before.items() if verdict == "killed")
+    assert after["ifthingisNoneornotby>1:"] == "survived"
+    seen = stream.load(tmp_path / "confirmed.jsonl")
+    assert 0.9 < seen.seconds["tests/test_more.py::test_ever"] < 3.0
+    assert not any("tests/test_more.py::test_ever" in names for names in seen.reached.values())
 
 
 def test_what_hangs_is_a_timeout(tree, tmp_path, monkeypatch):

@@ -126,6 +126,22 @@ def test_no_correction_goes_back_faster_than_the_path_goes_on(sense):
         assert length == pytest.approx(max(ramp, back / STEEPEST))
 
 
+@pytest.mark.parametrize("size", [1e-6, 0.1, 2.0])
+@pytest.mark.parametrize("component", range(6))
+def test_no_step_in_a_cut_is_too_small_or_too_large_for_a_ramp(component, size):
+    """Of any component, by a share of the largest force: from before the step the force goes on without one."""
+    task = stepped()
+    values = np.where(task.carries[:, None], task.force.values[2], 0.0)
+    change = size * np.abs(values).max()
+    values[3, component] += change
+    ramped = add_force_ramps(replace(task, force=replace(task.force, values=values, start=values)), 5e-3)
+    places = np.linspace(0.0, 1.0, 2001)
+    force = ramped.force.along(np.full(len(places), 3), places)
+    assert np.abs(force[0] - values[2]).max() < 1e-9 * change + 1e-12
+    assert np.abs(np.diff(force, axis=0)).max() < 0.2 * change
+    assert not ramped.steps(np.array([3]), np.ones(5, bool))[0]
+
+
 def test_what_was_measured_and_what_does_not_change_keep_their_steps():
     measured = stepped()
     measured = replace(measured, force=replace(measured.force, measured=True))

@@ -112,6 +112,16 @@ def test_planes_that_are_read_of_a_sinumerik(changed: dict[str, object], known: 
     assert ends("sinumerik", text) == (["1 -3 2"] if known else ["?*"])
 
 
+@pytest.mark.parametrize("changed", [{}, {"state": 200010}, {"plane": 0}])
+@pytest.mark.parametrize("code", ["G17", "G18", "G19"])
+def test_a_swivelled_plane_is_read_in_the_plane_of_its_documents_alone(
+    code: str, changed: dict[str, object]
+) -> None:
+    """In another one than G17 its angles may be other ones: nothing is known then, whatever else it states."""
+    text = f"{code}\n" + SWIVEL.format(**USUAL | changed) + "G17 G1 X1 Y2 Z3\n"
+    assert ends("sinumerik", text) == (["1 -3 2"] if code == "G17" else ["?*"])
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [

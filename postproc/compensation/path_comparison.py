@@ -185,8 +185,6 @@ def evaluate_transitions(
 
     def compare(part: slice) -> tuple[float, int, float, int]:
         segments = subdivided_motions(task, division, chosen[part])
-        if not len(segments):
-            return 0.0, 0, np.nan, 0
         first, last = (
             desired_path.at(segments.rows, share).position for share in (segments.first, segments.last)
         )

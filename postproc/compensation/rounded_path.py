@@ -172,8 +172,6 @@ class RoundedOutput:
     def turns(self) -> Floats:
         """(T, 2) rows and shares of the program's path near these motions where the force turns: where ramps of it
         start or end, and where motions start, as it changes within them."""
-        if not len(self.motions):
-            return np.empty((0, 2))
         rows = np.unique(self.segments.rows)
         rows = np.union1d(rows, np.minimum(rows + 1, len(self.task.toolpath) - 1))
         row = rows[self.task.carries[rows]]

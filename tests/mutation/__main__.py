@@ -1,4 +1,4 @@
-"""python -m tests.mutation FOLDER [--room R ...] [--sample N] [--seed S] [--seconds T] [--tier all] [--revision REV]"""
+"""python -m tests.mutation FOLDER [--room R ...] [--sample N] [--seed S] [--seconds T] [--confirm T] (all: --help)"""
 
 import os
 import sys

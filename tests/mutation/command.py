@@ -14,6 +14,7 @@ from pathlib import Path
 
 from mutation import judging, stream
 from mutation.mutants import Mutant, mutants, sample
+from mutation.second_stage import FurtherTests, further_tests
 
 HOME = Path(__file__).parent.parent.parent
 ROOMS = {
@@ -35,6 +36,7 @@ SLOW = (  # browsers, hundreds of processes, thousands of programs: a mutant is 
 )
 FIRST = 12
 """Tests that a mutant which is imported anew meets first: most fall at once, and few files are collected."""
+ALIVE = ("survived", "not reached")
 Z = 1.959963984540054
 """Two-sided 95 % of the normal distribution."""
 
@@ -154,6 +156,61 @@ def drawn(
     return totals, chosen
 
 
+def meet(
+    folder: Path,
+    tree: Path,
+    chosen: list[Drawn],
+    tests: list[str],
+    log: Path,
+    seconds: float,
+    tier: str,
+    further: FurtherTests | None = None,
+) -> stream.Stream:
+    """Lets each mutant meet tests of so many seconds; what can not be put in place is imported anew."""
+    pairs = [(one.mutant, one.text) for one in chosen]
+    seen = stream.run(tree, pairs, tests, log, seconds, tier, further)
+    for number, one in enumerate(chosen):
+        if number not in seen.verdicts:
+            tests_met = seen.choice(number, seconds)
+            verdict, test = judge(folder, tree, one.mutant, one.text, tests_met, tier)
+            line = {"mutant": number, "verdict": verdict, "test": test}
+            seen.add(line)
+            with log.open("a", encoding="utf-8") as out:
+                out.write(json.dumps(line) + "\n")
+    return seen
+
+
+def confirm(
+    folder: Path,
+    tree: Path,
+    chosen: list[Drawn],
+    first: stream.Stream,
+    packages: list[str],
+    seconds: float,
+    results: list[dict],
+) -> None:
+    """Lets what lived meet all tests, slow ones too, and changes the verdicts in ``results`` of what falls then."""
+    alive = [k for k, one in enumerate(results) if one["verdict"] in ALIVE]
+    if not alive:
+        return
+    tests = tests_of(tree, [], [])
+    near = [test for test in tests if stream.is_near(tree, test, packages)]
+    judging.register_profile(judging.ALL)
+    further = further_tests(first, alive, near, seconds)
+    log = folder / "confirmed.jsonl"
+    seen = meet(folder, tree, [chosen[k] for k in alive], tests, log, seconds, judging.ALL, further)
+    for number, k in enumerate(alive):
+        verdict, test = seen.verdicts[number]
+        if verdict != "not reached":
+            met = len(seen.choice(number, seconds))
+            results[k].update(verdict=verdict, test=test, tests=max(met, results[k]["tests"]))
+    fell = sum(results[k]["verdict"] not in ALIVE for k in alive)
+    print(
+        f"{len(alive)} that lived met further tests, slow ones too: {fell} fell; "
+        f"{len(seen.seconds)} tests run, {seen.not_run} not for want of seconds"
+    )
+
+
 def main(words: list[str] | None = None) -> int:
     """Judges samples; results are in FOLDER/mutants.jsonl, one mutant a line; a run that was stopped goes on."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__)
@@ -163,6 +220,13 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(
         "--seconds", type=float, default=60.0, help="processor seconds of tests that one mutant meets"
+    )
+    parser.add_argument(
+        "--confirm",
+        type=float,
+        default=120.0,
+        metavar="SECONDS",
+        help="processor seconds of all tests, slow ones too, that a mutant meets which lived; 0: none",
     )
     parser.add_argument("--revision", default="HEAD")
     parser.add_argument("--tier", choices=("fast", "all"), default="fast", help="which tests")
@@ -188,25 +252,18 @@ def main(words: list[str] | None = None) -> int:
         left_out = ", ".join(Path(test).stem for test in near if test not in tests)
         print(f"left out though they import the rooms: {left_out or 'none'}")
         tests = [test for test in near if test in tests]
-    pairs = [(one.mutant, one.text) for one in chosen]
-    log = folder / "stream.jsonl"
-    seen = stream.run(tree, pairs, tests, log, asked.seconds, tier)
+    first = meet(folder, tree, chosen, tests, folder / "stream.jsonl", asked.seconds, tier)
     results = []
     for number, one in enumerate(chosen):
-        if number not in seen.verdicts:
-            verdict, test = judge(
-                folder, tree, one.mutant, one.text, seen.choice(number, asked.seconds), tier
-            )
-            line = {"mutant": number, "verdict": verdict, "test": test}
-            seen.add(line)
-            with log.open("a", encoding="utf-8") as out:
-                out.write(json.dumps(line) + "\n")
-        verdict, test = seen.verdicts[number]
-        result = {"room": one.room, **asdict(one.mutant), "verdict": verdict, "test": test}
-        tests_met = len(seen.choice(number, asked.seconds))
-        results.append({**result, "tests": tests_met, "before": one.before, "after": one.after})
+        verdict, test = first.verdicts[number]
+        met = len(first.choice(number, asked.seconds))
+        result = {"room": one.room, **asdict(one.mutant), "verdict": verdict, "test": test, "tests": met}
+        results.append({**result, "before": one.before, "after": one.after})
+    print(f"{len(first.seconds)} tests, {sum(first.seconds.values()):.0f} s of the processor")
+    if asked.confirm > 0:
+        everywhere = [top for room in rooms for top in ROOMS[room]]
+        confirm(folder, tree, chosen, first, everywhere, asked.confirm, results)
     (folder / "mutants.jsonl").write_text("".join(json.dumps(one) + "\n" for one in results))
-    print(f"{len(seen.seconds)} tests, {sum(seen.seconds.values()):.0f} s of the processor")
     print("room          mutants  sampled  killed  timeout  survived  not reached  killed % (95 %)")
     for room in rooms:
         print(row(room, totals[room], [one for one in results if one["room"] == room]))

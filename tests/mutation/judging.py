@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import functools
 import os
 import resource
 import signal
@@ -67,6 +68,7 @@ def register_profile(tier: str) -> None:
     hypothesis.settings.load_profile(PROFILE)
 
 
+@functools.cache  # many files of tests import the same modules of the tests
 def imported(path: Path) -> list[str]:
     """Modules that a file names in its imports, and what it takes from them."""
     found: set[str] = set()

@@ -22,7 +22,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import pytest
 from _pytest.runner import runtestprotocol
@@ -41,17 +41,19 @@ LIVES, FALLS = 0, 1
 class Stream:
     """``seconds``: what each test takes that passes; ``reached``: number of a mutant -> tests that come by it; ``ran``:
     those that tests come by while they run, and not only what they import;
-    ``verdicts``: number of a mutant -> (verdict, test at which it fell); ``ended``: all that can be done here is."""
+    ``verdicts``: number of a mutant -> (verdict, test at which it fell); ``ended``: all that can be done here is;
+    ``not_run``: tests for which the seconds had no room."""
 
     seconds: dict[str, float] = field(default_factory=dict)
     reached: dict[int, list[str]] = field(default_factory=dict)
     ran: set[int] = field(default_factory=set)
     verdicts: dict[int, tuple[str, str]] = field(default_factory=dict)
     ended: bool = False
+    not_run: int = 0
 
     def add(self, line: dict[str, Any]) -> None:
         if "ended" in line:
-            self.ended = True
+            self.ended, self.not_run = True, line.get("not run", 0)
             return
         if "mutant" in line:
             self.verdicts[line["mutant"]] = line["verdict"], line["test"]
@@ -79,6 +81,23 @@ class Stream:
         return chosen
 
 
+class Further(Protocol):
+    """Which tests run, in which order; seconds of the processor that each and all may take, unmutated."""
+
+    each: float
+    all: float
+
+    def in_order(self, items: Sequence[pytest.Item]) -> list[pytest.Item]: ...
+
+
+class TooLong(BaseException):
+    """A test takes more seconds than it may; no ``Exception``, which a law would try to make smaller."""
+
+
+def _too_long(*_: Any) -> None:
+    raise TooLong
+
+
 def load(path: Path) -> Stream:
     """What a run left, whole or not."""
     stream = Stream()
@@ -91,8 +110,15 @@ class _Runner:
     """The plug-in of pytest that runs the tests, and then some of them again for each mutant."""
 
     def __init__(
-        self, tree: Path, mutants: Sequence[tuple[Mutant, str]], probes: Probes, log: Path, seconds: float
+        self,
+        tree: Path,
+        mutants: Sequence[tuple[Mutant, str]],
+        probes: Probes,
+        log: Path,
+        seconds: float,
+        further: Further | None,
     ) -> None:
+        self.further = further
         self.tree, self.mutants, self.probes, self.log, self.budget = tree, mutants, probes, log, seconds
         self.stream = load(log)
         self.fixtures: dict[int, set[int]] = {}
@@ -141,13 +167,22 @@ class _Runner:
         if report.failed or report.skipped:
             self.failed.add(report.nodeid)
 
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        if self.further is not None:
+            items[:] = self.further.in_order(items)
+
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
         own: set[int] = set()
         before = self.probes.reached.turn(own)
+        if self.further is not None:
+            signal.signal(signal.SIGPROF, _too_long)
+            signal.setitimer(signal.ITIMER_PROF, self.further.each)
         start = time.process_time()
         result = yield
         seconds = time.process_time() - start
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
         self.probes.reached.turn(before)
         if item.nodeid in self.failed:
             own, ran = set(), []
@@ -174,15 +209,20 @@ class _Runner:
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         items = [item for item in session.items if item.nodeid not in self.stream.seconds]
+        spent = sum(self.stream.seconds.values())
         for item, following in zip_longest(items, items[1:]):
+            if self.further is not None and spent >= self.further.all:
+                break
             session.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
+            spent += self.stream.seconds[item.nodeid]
+        session._setupstate.teardown_exact(None)  # fixtures of a file in whose midst the seconds were over
         gc.collect()
         gc.freeze()
         by_name = {item.nodeid: item for item in session.items}
         for number in range(len(self.mutants)):
             if number not in self.stream.verdicts:
                 self.judge(number, by_name)
-        self.keep({"ended": True})
+        self.keep({"ended": True, "not run": len(set(by_name) - set(self.stream.seconds))})
         return True
 
     def judge(self, number: int, items: dict[str, pytest.Item]) -> None:
@@ -257,9 +297,10 @@ def run(
     log: Path,
     seconds: float,
     tier: str,
+    further: Further | None = None,
 ) -> Stream:
     """Runs files of tests in a process of its own, and at most so many processor seconds of them for a mutant.  A run
-    that was stopped goes on where it was."""
+    that was stopped goes on where it was.  ``further``: which of them, and how long, all without it."""
     seen = load(log)
     if seen.ended:
         return seen
@@ -275,7 +316,7 @@ def run(
             probes = Probes(tree, [mutant for mutant, _ in mutants])
             probes.install()
             os.environ["POSTPROC_THREADS"] = "1"  # a fork takes one thread along
-            plugin = _Runner(tree, mutants, probes, log, seconds)
+            plugin = _Runner(tree, mutants, probes, log, seconds, further)
             options = [*judging.OPTIONS, "--hypothesis-profile", judging.PROFILE, "-m", tier]
             code = int(pytest.main([*tests, *options], plugins=[plugin]))
         finally:

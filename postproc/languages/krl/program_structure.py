@@ -40,6 +40,7 @@ from postproc.languages.krl.statement_effects import (
     effects_of_bas,
     effects_of_unknown,
     entries_given,
+    entries_in,
     functions_of,
     is_harmless,
     read_by,
@@ -294,6 +295,7 @@ class _Surveyor:
         if not all(map(is_harmless, functions)):
             # What is handed to a function may come back changed.
             effects = effects | identifiers(statement.code)
+            found.table_entries |= entries_in(statement.code)
             found.handed.add(Handed(functions, statement.code, is_call=False))
         _join(found.effects, effects)
         said = statement.strings

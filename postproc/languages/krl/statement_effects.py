@@ -94,7 +94,7 @@ _INDEX = rb"(?:\[(?:[^\[\]]|\[[^\[\]]*+\])*+\][ \t]*+)?"
 _RETURNED = re.compile(
     rb"[ \t]*+(" + NAME + rb")[ \t]*+" + _INDEX + rb"(?:\.[ \t]*+" + NAME + rb"[ \t]*+" + _INDEX + rb")*+\Z"
 )
-_ENTRY = re.compile(rb"[ \t]*+((?:BASE|TOOL)_DATA)[ \t]*+(?:\[([^\[\]]*+)\])?+", re.I)
+_ENTRY = re.compile(rb"\b((?:BASE|TOOL)_DATA)[ \t]*+(?:\[([^\[\]]*+)\])?+", re.I)
 _DIMENSIONS = re.compile(rb"\[[^\]\[]*+\]")
 _APART = re.compile(rb"\$[ \t]++")
 _ASSIGNED = re.compile(rb"(?<![A-Za-z0-9_$.])(" + NAME + rb")[ \t]*+(?:[\[.][^=]{0,200}+)?+=(?!=)")
@@ -249,13 +249,24 @@ def returned_to(text: bytes) -> bytes | None:
 
 def entries_given(call: Call) -> set[bytes | None]:
     """The entries of BASE_DATA and TOOL_DATA that are handed over; None for one whose number is computed."""
-    places = filter(None, map(_ENTRY.match, split_values(call.arguments)))
-    return {None if found[2] is None else keyed(found[1].upper(), found[2]) for found in places}
+    places = (_ENTRY.match(text.strip(b" \t")) for text in split_values(call.arguments))
+    return set(map(_entry, filter(None, places)))
+
+
+def entries_in(code: bytes) -> set[bytes | None]:
+    """The entries of BASE_DATA and TOOL_DATA that an expression names; None for one whose number is computed."""
+    return set(map(_entry, _ENTRY.finditer(without_strings(code))))
+
+
+def _entry(found: re.Match[bytes]) -> bytes | None:
+    return None if found[2] is None else keyed(found[1].upper(), found[2])
 
 
 def effects_of(statement: Statement, known: Directions = MappingProxyType({})) -> tuple[Effects, bytes]:
     """What a statement (no motion, no block) may change, and the routine it calls."""
     said = statement.strings
+    if statement.kind == StatementKind.UMLAUT_NAME and not isinstance(said, Call):
+        return effects_of_unknown(statement.code), b""
     if isinstance(said, Assignment):
         if said.name == b"$VEL" and said.path not in (b"", b"CP"):
             return set(), b""
