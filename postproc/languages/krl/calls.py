@@ -19,7 +19,8 @@ from postproc.languages.krl.lexing import LOOPS, NAME, Call, Statement, identifi
 from postproc.languages.krl.modal_state import TRIGGERED, ModalState
 from postproc.languages.krl.other_modules import RoutineExit, take_exit
 from postproc.languages.krl.program_blocks import Routine
-from postproc.languages.krl.program_structure import MOST_EFFECTS, callers, closure
+from postproc.languages.krl.program_structure import MOST_EFFECTS
+from postproc.languages.krl.routine_calls import callers, closure
 from postproc.languages.krl.statement_effects import (
     EVERYTHING_AND_COMMENTS,
     PATH_FROM_FILE,
@@ -276,7 +277,7 @@ class Calls(BlockFlow):
             return False
         if len(run.structure.routines) > MOST_EFFECTS:
             return False  # as long to look through as nobody waits for
-        for name in closure(run.structure, [routine.name]):
+        for name in closure(run.structure.routines, [routine.name]):
             inner = run.structure.routines[name]
             first, last = run.code[inner.start], run.code[min(inner.end, len(run.code) - 1)]
             mentioned = self._mentioned(first, last)
@@ -373,7 +374,7 @@ class Calls(BlockFlow):
         if self.event_routines is None:
             run = self.run
             self.event_routines = callers(
-                run.structure,
+                run.structure.routines,
                 (
                     one.name
                     for one in run.structure.routines.values()
@@ -425,18 +426,16 @@ class Calls(BlockFlow):
     def _note_other(self, item: Statement, name: bytes) -> None:
         """Takes up what else another module does, now or at a time of its own."""
         run, (module, _) = self.run, self.run.others.routines[name]
-        state = run.state
         if module.apart:
-            state.external_apart = state.external_apart | {b"$ASYNC_AXIS"}
-            state.external = apart(state.external)
+            run.state.external_apart |= {b"$ASYNC_AXIS"}
+            run.state.external = apart(run.state.external)
         if module.has_trigger:
-            state.no_insert = TRIGGERED
+            run.state.no_insert = TRIGGERED
         run.expect_later(module.structure.later_effects, item.line)
+        file = module.document.path.name
         for unread in run.others.unread[name]:
-            file = module.document.path.name
-            message = (
-                f"{shown(unread)}, which {file} calls, is not read: base and tool are assumed unchanged by it"
-            )
+            called = f"{shown(unread)}, which {file} calls,"
+            message = f"{called} is not read: base and tool are assumed unchanged by it"
             run.add_finding("KRL010", message, item)
 
     def _unread(self, item: Statement, name: bytes) -> None:

@@ -25,12 +25,8 @@ from postproc.languages.krl.modal_state import FrameIndex, FrameRegister, ModalS
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.predecessors import expanded
 from postproc.languages.krl.program_blocks import Routine
-from postproc.languages.krl.program_structure import (
-    ProgramStructure,
-    closure,
-    program_structure,
-    spread_later,
-)
+from postproc.languages.krl.program_structure import ProgramStructure, program_structure, spread_later
+from postproc.languages.krl.routine_calls import closure
 from postproc.languages.krl.scan import scan
 from postproc.languages.krl.statement_effects import Effect, Effects, is_harmless, returned_to
 from postproc.languages.krl.target import UnknownValue
@@ -242,7 +238,9 @@ def _settle(modules: OtherModules, name: bytes) -> None:
             if isinstance(effect, str) or effect not in own.types or effect in own.shared
         }
         called = {
-            call for one in closure(module.structure, [at]) for call in module.structure.routines[one].calls
+            call
+            for one in closure(module.structure.routines, [at])
+            for call in module.structure.routines[one].calls
         }
         todo += sorted(called - module.structure.routines.keys())
     modules.effects[name], modules.unread[name] = effects, tuple(unread)

@@ -46,7 +46,8 @@ from postproc.languages.krl.other_modules import (
     visible,
 )
 from postproc.languages.krl.program_blocks import Routine
-from postproc.languages.krl.program_structure import INLINE, closure
+from postproc.languages.krl.program_structure import INLINE
+from postproc.languages.krl.routine_calls import closure
 from postproc.languages.krl.statement_effects import (
     ANNOTATION,
     COMMENTS,
@@ -86,7 +87,7 @@ class ProgramFlow(Calls):
                 self.reset()
                 self._run(routine)
             pc = routine.end + 1
-        walked = closure(run.structure, [*self.text_called, *run.structure.later])
+        walked = closure(run.structure.routines, [*self.text_called, *run.structure.later])
         for routine in run.structure.routine_at.values():
             if not routine.is_main and (routine.name not in run.followed or routine.name in walked):
                 run.variables.facts = start.variables

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from postproc.languages.core.comments_in_force import place_of
-from postproc.languages.core.reach import reached
 from postproc.languages.krl.aliases import Handed, Parameters, parameters_of, spread
 from postproc.languages.krl.later_changes import EVENTS, later_actions, later_functions
 from postproc.languages.krl.lexing import (
@@ -26,6 +25,7 @@ from postproc.languages.krl.lexing import (
     identifiers,
 )
 from postproc.languages.krl.program_blocks import Block, Routine
+from postproc.languages.krl.routine_calls import closure
 from postproc.languages.krl.statement_effects import (
     ANNOTATION,
     HERE,
@@ -367,7 +367,7 @@ def program_structure(
                 block.is_entered = block.is_entered or not block.start < first <= last < block.end
     _settle(found, surveyor.blocks, others)
     found.later_effects |= {SYSTEM[name] for name in found.later if name in SYSTEM}
-    for name in [*closure(found, found.later), *(found.later & others.keys())]:
+    for name in [*closure(found.routines, found.later), *(found.later & others.keys())]:
         effects = found.routines[name].effects if name in found.routines else others[name]
         found.later_effects |= {effect for effect in effects if isinstance(effect, str)}
         found.later.update(effect for effect in effects if isinstance(effect, bytes))
@@ -382,21 +382,6 @@ def spread_later(structure: ProgramStructure, others: Mapping[bytes, Parameters]
     every = spread(structure.later, structure.handed, {**others, **parameters_of(structure.routines)})
     structure.later |= {effect for effect in every if isinstance(effect, bytes)}
     structure.later_effects |= {effect for effect in every if isinstance(effect, str)}
-
-
-def closure(structure: ProgramStructure, names: Iterable[bytes]) -> set[bytes]:
-    """The routines of the file among ``names``, and all that they call."""
-    routines = structure.routines
-    return reached(routines.keys() & set(names), lambda name: routines[name].calls & routines.keys())
-
-
-def callers(structure: ProgramStructure, names: Iterable[bytes]) -> set[bytes]:
-    """The routines of the file among ``names``, and all that call one of them, or call what calls one ..."""
-    callers_of: dict[bytes, set[bytes]] = {}
-    for name, routine in structure.routines.items():
-        for call in routine.calls:
-            callers_of.setdefault(call, set()).add(name)
-    return reached(structure.routines.keys() & set(names), lambda name: callers_of.get(name, ()))
 
 
 def _join(into: Effects, more: Iterable[Effect]) -> None:
@@ -417,7 +402,7 @@ def _settle(structure: ProgramStructure, blocks: Sequence[Block], others: Mappin
             if block.calls:
                 _join(block.effects, [*structure.effects, "all", "point", *MODAL])
         return
-    reached = {name: closure(structure, [name]) for name in structure.routines}
+    reached = {name: closure(structure.routines, [name]) for name in structure.routines}
     strange = {
         name
         for name, routine in structure.routines.items()
