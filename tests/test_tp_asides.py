@@ -9,6 +9,7 @@ import pytest
 
 from postproc.base.document import Document
 from postproc.languages import DIALECTS
+from postproc.languages.dialect import Program
 from postproc.toolpath import Toolpath
 
 POINT = """P[{}]{{
@@ -20,12 +21,16 @@ POINT = """P[{}]{{
 """
 
 
-def read(*lines: str) -> Toolpath:
+def program(*lines: str) -> Program:
     body = ["UFRAME_NUM=1", "UTOOL_NUM=1", *lines]
     text = "".join(f"{n:4d}:  {line} ;\n" for n, line in enumerate(body, 1))
     points = "".join(POINT.format(n, 10 * n) for n in range(1, 6))
     raw = f"/PROG PART\n/ATTR\n/MN\n{text}/POS\n{points}/END\n".encode()
-    return DIALECTS["tp"].read((Document(Path("part.ls"), raw),)).toolpath
+    return DIALECTS["tp"].read((Document(Path("part.ls"), raw),))
+
+
+def read(*lines: str) -> Toolpath:
+    return program(*lines).toolpath
 
 
 @pytest.mark.parametrize("option", ["TB .10sec,CALL OTHER", "TA .10sec,CALL OTHER(1)", "DB 5.0mm,CALL OTHER"])
@@ -34,6 +39,12 @@ def test_a_program_beside_a_motion_may_set_registers_at_any_time(option: str) ->
     assert np.isnan(path.feed).all()
     path = read("R[1]=50", "L P[1] R[1]mm/sec FINE TA .10sec,DO[1]=ON", "R[1]=60", "L P[2] R[1]mm/sec FINE")
     np.testing.assert_allclose(path.feed, [0.05, 0.06])
+
+
+def test_a_program_beside_a_motion_is_reported() -> None:
+    findings = program("L P[1] 9mm/sec FINE DB 5.0mm,CALL OTHER(2)", "CALL OTHER", "CALL THIRD").findings
+    assert [one.message.split()[0] for one in findings if one.code == "FTP010"] == ["OTHER", "THIRD"]
+    assert [one.line for one in findings if one.code == "FTP010"] == [6, 8]
 
 
 def test_a_program_beside_a_motion_decides_jumps() -> None:

@@ -30,7 +30,7 @@ _ACTION = (
     + _REGISTER
     + rb"))"
 )
-_ALTERING = re.compile(rb"CALL|POINT_LOGIC|A?+R[ \t]*+\[", re.I)
+_ALTERING = re.compile(rb"CALL[ \t]++(?P<called>[A-Z_][A-Z0-9_]*+)|POINT_LOGIC|A?+R[ \t]*+\[", re.I)
 _CARRIED = re.compile(
     rb"[ \t]*+(?:ACC[ \t]*+(?:[0-9]++|A?+R" + _REGISTER + rb")|PTH|PSPD[ \t]*+[0-9]++)(?![A-Z0-9_.])", re.I
 )
@@ -63,6 +63,7 @@ class _Options:
     carried: list[bytes]
     own: bool = False
     alters: bool = False
+    called: str = ""
     relative: bool = False
     wrist: bool = False
     problem: tuple[str, str] | None = None
@@ -104,6 +105,7 @@ def parse_motion(text: bytes) -> TpMove | None:
     return TpMove(
         form, tuple(points), shown, value, unit, termination, corner[:2], b" ".join(options.carried), options.own,
         options.wrist, problem, options.skip, head.span(1), options.alters, options.relative,
+        options.called,
     )  # fmt: skip
 
 
@@ -166,7 +168,9 @@ def _read_options(text: bytes, at: int, options: _Options) -> int:
         elif (found := _OWN.match(text, after)) is not None:
             options.own = True
             action = found["at_time"] or found["at_place"]
-            options.alters |= action is not None and _ALTERING.match(action) is not None
+            if action is not None and (altering := _ALTERING.match(action)) is not None:
+                options.alters = True
+                options.called = (altering["called"] or b"").decode("latin-1") or options.called
         elif (found := _DISPLACED.match(text, after)) is not None:
             name = found[1].decode("latin-1")
             options.relative |= name.upper() == "INC"

@@ -194,8 +194,8 @@ class TpPropagation:
     def _record(self, step: TpStep, reached: Reached) -> None:
         at, one = step
         match one:
-            case ProgramCall():
-                self.calls.setdefault(at, one.name)
+            case ProgramCall(name=name) | TpMove(called=name) if name:
+                self.calls.setdefault(at, name)
             case PositionUse(reads_place=True):
                 self.reads[at] = self.reads.get(at, frozenset()) | reached.last
             case StatementNotRead(moves=False):

@@ -46,7 +46,8 @@ class TpMove:
     ``carried``: options that inserted motions have too; ``own``: it has options that count from its own start;
     ``wrist``: Wjnt; ``problem``: code and reason for which it is not corrected; ``skip``: label to which it may lead.
     ``head``: start and stop of the letter of its form in the text of the statement; ``alters``: what it does beside
-    its path (TB, TA, DB) may set registers; ``relative``: its target counts from where the robot is (INC).
+    its path (TB, TA, DB) may set registers; ``relative``: its target counts from where the robot is (INC);
+    ``called``: the program that it calls beside its path.
     """
 
     form: bytes
@@ -64,6 +65,7 @@ class TpMove:
     head: tuple[int, int]
     alters: bool = False
     relative: bool = False
+    called: str = ""
 
 
 @dataclass(frozen=True, slots=True)
