@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 
+from postproc.languages.core.rounded_numbers import are_comparable, computed
 from postproc.languages.krl.lexing import NAME, is_integer, is_number, number
 from postproc.languages.krl.spatial import inverse, product
 from postproc.languages.krl.target import COMPONENTS, FrameEntry, KrlTarget, UnknownValue, known, parse, shown
@@ -37,8 +38,6 @@ _PART = re.compile(rb"(" + NAME + rb")((?:\[\d{1,18}+\])?+(?:\." + NAME + rb")?+
 """A component or an element with an index of digits: most of what is no number and no name."""
 _COUNTED = re.compile(rb"(" + NAME + rb")[ \t]*+(==|<>|<=|>=|[-+*<>])[ \t]*+(\d{1,15})[ \t]*+\Z")
 """A variable and a whole number: most of what loops and branches compute and compare."""
-LAST_DIGITS = 1e-6
-"""Of a REAL or of 1: a REAL has 32 bits on the controller, so what is nearer may be the same there, or not."""
 _COMPARISONS = {
     b"==": lambda a, b: a == b, b"<>": lambda a, b: a != b, b"<": lambda a, b: a < b,
     b">": lambda a, b: a > b, b"<=": lambda a, b: a <= b, b">=": lambda a, b: a >= b,
@@ -242,7 +241,7 @@ class _Parser:
             elif isinstance(a, int) and isinstance(b, int):
                 left = abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)  # whole numbers stay whole
             else:
-                left = a / b
+                left = computed(a / b, a, b)
             left = self._within(left)
         return left
 
@@ -394,7 +393,9 @@ class _Parser:
             self._next()
             given.append(self._number(self.comparison(depth + 1)))
         self._expect(b")")
-        return function(*given)
+        if name == b"ABS":
+            return _of_type(function(*given), *given)
+        return computed(function(*given), *given)
 
     def _expect(self, token: bytes) -> None:
         if self.token != token:
@@ -408,15 +409,15 @@ class _Parser:
 
 
 def _of_type(result: int | float, *operands: int | float) -> int | float:
-    """A result, whose type is as little known as that of its operands."""
+    """A result, whose type is as little known as that of its operands; a REAL has 32 bits on the controller."""
+    if isinstance(result, float):
+        result = computed(result, *operands)
     return UntypedNumber(result) if any(isinstance(each, UntypedNumber) for each in operands) else result
 
 
 def decided_by_digits(one: object, other: object) -> bool:
-    """Whether two numbers differ by no more than their last digits."""
-    if not is_number(one) or not is_number(other):
-        return False
-    return 0 < abs(one - other) < LAST_DIGITS * max(1.0, abs(one))
+    """Whether it depends on the digits of a REAL which of two numbers is the larger one, or that they are equal."""
+    return is_number(one) and is_number(other) and not are_comparable(one, other)
 
 
 def component(value: Value, path: bytes) -> Value | None:

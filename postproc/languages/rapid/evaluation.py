@@ -11,7 +11,7 @@ import numpy as np
 
 from postproc.base.geometry import rotation_from_abc, rotation_from_vector
 from postproc.base.units import DEG
-from postproc.languages.core.rounded_numbers import WHOLE, are_comparable
+from postproc.languages.core.rounded_numbers import WHOLE, are_comparable, computed
 from postproc.languages.rapid.data_types import RECORDS, Components
 from postproc.languages.rapid.quaternions import quaternion_from_rotation, rotation_from_quaternion
 from postproc.languages.rapid.syntax_tree import (
@@ -189,7 +189,7 @@ class Evaluator:
         number = number_of(values[0]) if len(values) == len(arguments) == 1 else None
         if function is not None and number is not None:
             try:
-                return Leaf(function(number)), b"NUM"
+                return Leaf(computed(function(number), number)), b"NUM"
             except (ValueError, OverflowError):
                 return UnknownData(f"{_shown(name)} has no value there"), b"NUM"
         return UnknownData(f"{_shown(name)} is computed where the program runs"), b""
@@ -329,9 +329,9 @@ def _of_numbers(operator: bytes, one: float, other: float) -> Value:
         return TRUE if _COMPARISONS[operator](one, other) else FALSE
     if operator in (b"+", b"-", b"*"):
         value = one + other if operator == b"+" else one - other if operator == b"-" else one * other
-        return Leaf(value) if math.isfinite(value) else UnknownData("it is too large")
+        return Leaf(computed(value, one, other)) if math.isfinite(value) else UnknownData("it is too large")
     if operator == b"/" and other != 0 and math.isfinite(one / other):
-        return Leaf(one / other)
+        return Leaf(computed(one / other, one, other))
     if operator in (b"DIV", b"MOD") and other > 0 and one >= 0 and one == int(one) and other == int(other):
         return Leaf(float(one // other if operator == b"DIV" else one % other))
     return UnknownData("it is computed")

@@ -13,7 +13,7 @@ from postproc.languages.core.field_joins import FieldJoins, lost
 from postproc.languages.core.flow_runner import FlowRunner
 from postproc.languages.core.motion_sources import ELSEWHERE, START, Meeting, Source, met
 from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
-from postproc.languages.core.rounded_numbers import are_comparable
+from postproc.languages.core.rounded_numbers import are_comparable, computed
 from postproc.languages.core.waits import Waits
 from postproc.languages.tp.statement_flow import StatementFlow, TpStep
 from postproc.languages.tp.tp_statements import (
@@ -77,11 +77,11 @@ class TpState:
             return None
         match expression.operation:
             case b"+":
-                return one + two
+                return computed(one + two, one, two)
             case b"-":
-                return one - two
+                return computed(one - two, one, two)
             case b"*":
-                return one * two
+                return computed(one * two, one, two)
         return None  # divisions round as the controller does
 
     def with_register(self, number: int, value: float | None) -> TpState:
