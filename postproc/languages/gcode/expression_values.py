@@ -12,6 +12,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
+from postproc.languages.core.rounded_numbers import are_comparable, computed
+
 LONGEST = 400
 """Characters of an expression; a longer one is not evaluated."""
 DEEPEST = 20
@@ -22,6 +24,8 @@ LAST_DIGITS = 1e-9
 
 Lookup = Callable[[str], float]
 """Name of a variable -> its value, NaN where it is not known."""
+
+_COMPARING = ("EQ", "NE", "GT", "GE", "LT", "LE")
 
 
 def _truth(value: bool) -> float:
@@ -83,6 +87,14 @@ def _calculate(operator: str, a: float, b: float) -> float:
     return _compare(operator, a, b)
 
 
+def _calculate_rounded(operator: str, a: float, b: float) -> float:
+    """The same where controls round further: they decide whether numbers that they compute are equal."""
+    result = _calculate(operator, a, b)
+    if operator in _COMPARING:
+        return result if abs(a - b) > LAST_DIGITS * max(1.0, abs(a)) or are_comparable(a, b) else math.nan
+    return computed(result, a, b) if operator in "+-*/" else result
+
+
 def _half_away(value: float) -> float:
     return math.copysign(math.floor(abs(value) + 0.5), value)
 
@@ -111,7 +123,7 @@ _FUNCTIONS: Mapping[str, Callable[[float], float]] = {
 }
 _BRACKETED_LEVELS = {
     **dict.fromkeys(("AND", "OR", "XOR"), 1),
-    **dict.fromkeys(("EQ", "NE", "GT", "GE", "LT", "LE"), 2),
+    **dict.fromkeys(_COMPARING, 2),
     **dict.fromkeys("+-", 3),
     **dict.fromkeys(("*", "/", "MOD"), 4),
     "**": 5,
@@ -122,13 +134,14 @@ _BRACKETED_LEVELS = {
 class ExpressionLanguage:
     """levels: operator -> how closely it binds; functions by name; brackets: of sub-expressions and arguments;
     numbered: variables are ``#`` and a number; logical: operands of AND and OR need brackets of their own, as controls
-    differ in what they bind."""
+    differ in what they bind; rounds: some controls have fewer digits than double precision."""
 
     levels: Mapping[str, int]
     functions: Mapping[str, Callable[[float], float]]
     brackets: tuple[str, str]
     numbered: bool
     logical: bool = False
+    rounds: bool = False
 
 
 LINUXCNC = ExpressionLanguage(
@@ -153,6 +166,7 @@ FANUC = ExpressionLanguage(
     ("[", "]"),
     True,
     logical=True,
+    rounds=True,
 )
 SINUMERIK = ExpressionLanguage(
     {
@@ -246,8 +260,13 @@ class _ExpressionParser:
                 if edges != ("[", "]", "[", "]"):
                     raise ValueError(operator)
             name = _SAME.get(operator, operator)
-            known = not (math.isnan(value) or math.isnan(other))
-            value, at = _calculate(name, value, other) if known else math.nan, end
+            if math.isnan(value) or math.isnan(other):
+                value = math.nan
+            elif language.rounds:
+                value = _calculate_rounded(name, value, other)
+            else:
+                value = _calculate(name, value, other)
+            at = end
         return value, at
 
     def primary(self, at: int, depth: int) -> tuple[float, int]:
