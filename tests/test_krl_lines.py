@@ -267,9 +267,9 @@ def value(text: str) -> object:
         ("(5)", 5), ("((5)", None), ("5)", None), ("()", None), ("5 5", None), ("5;", None), ("", None), (" ", None),
         ("1=1", None), ("'HG'+1", None), ("{X 1", None), ("{X {Y 1}}", None), ("{X two}", None), ("LOST+1", None),
         ("none", None),
-        ("move(1)", None), ("2147483648*2147483648", 2**62), ("2147483648*2147483649", None),
+        ("move(1)", None), ("2147483647*1", 2**31 - 1), ("2147483647+1", None), ("2147483648*2147483649", None),
         ("-2147483648*2147483649", None),
-        ("0+" + "9" * 18, 10**18 - 1), ("0+1" + "0" * 18, None), ("1.0E300*1.0E300", None),
+        ("0+" + "9" * 18, None), ("0+1" + "0" * 18, None), ("1.0E300*1.0E300", None),
         ("2.0*3000000000000000000.0", 6e18),
         ("1/0", None), ("1.0/0", None), ("TRUE/2", None), ("ACOS(2)", None), ("FALSE", False), ("true", True),
         ("1" + "+1" * 30, 31), (" " * 45 + "5", 5), ("'B" + "0" * 36 + "1'", 1),
@@ -631,7 +631,7 @@ SIX = {"base", "tool", "feed", "apo", "mode", "turning"}
         ("FOR i = 1 TO n", {b"I"}, ""), ("FOR 5", set(), ""), ("IF LIN THEN", set(), ""), ("5 LIN P", {"point"}, ""),
         ("5 LINE P", set(), ""), ("WAIT FOR LIN", set(), ""), ("5 $LIN", set(), ""), ("5 #PTP", set(), ""),
         ("l\xe5 x", {"point"}, ""), ("l\xe5 x=1", EVERYTHING, ""), ("l\xe5 (1)", EVERYTHING, ""),
-        ("GOTO l\xe5", EVERYTHING, ""), ("l\xe5:", EVERYTHING, ""), ("Z\xe4=1", {b"Z_"}, ""),
+        ("GOTO l\xe5", EVERYTHING, ""), ("l\xe5:", EVERYTHING, ""), ("Z\xe4=1", set(), ""),
     ],
 )  # fmt: skip
 def test_what_a_statement_changes(line: str, changes: set[object], calls: str) -> None:

@@ -211,11 +211,11 @@ class _Runner:
         items = [item for item in session.items if item.nodeid not in self.stream.seconds]
         spent = sum(self.stream.seconds.values())
         for item, following in zip_longest(items, items[1:]):
-            if self.further is not None and spent >= self.further.all:
-                break
-            session.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
+            is_last = self.further is not None and spent >= self.further.all
+            session.config.hook.pytest_runtest_protocol(item=item, nextitem=None if is_last else following)
             spent += self.stream.seconds[item.nodeid]
-        session._setupstate.teardown_exact(None)  # fixtures of a file in whose midst the seconds were over
+            if is_last:
+                break
         gc.collect()
         gc.freeze()
         by_name = {item.nodeid: item for item in session.items}
