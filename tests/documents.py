@@ -116,6 +116,16 @@ def keep_masked_lines(old: str, new: str) -> str:
     return "".join(lines)
 
 
+SAME_NUMBERS = {
+    "OPENBLAS_CORETYPE": "Haswell",
+    "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR",
+    "NUMBA_CPU_NAME": "x86-64-v3",
+    "NUMBA_CPU_FEATURES": "+avx2,+fma",
+}
+"""Of vector units the common ones: with others sums round otherwise, and of two equally good choices the other one is
+made (a pose of a plan, the last of 8640 places)."""
+
+
 @dataclass(frozen=True)
 class Workplace:
     """A temporary copy of what the documents' commands work on."""
@@ -141,6 +151,7 @@ class Workplace:
             "PYTHONDONTWRITEBYTECODE": "1",
             "LC_ALL": "C.UTF-8",
             "TZ": "UTC",
+            **SAME_NUMBERS,
         }
         return cls(folder / "work", environment)
 
