@@ -12,6 +12,8 @@ import pytest
 from postproc.base.document import Document
 from postproc.languages import DIALECTS
 from postproc.languages.core.rounded_numbers import are_comparable, computed
+from postproc.languages.gcode.expression_values import FANUC, LINUXCNC
+from postproc.languages.gcode.expression_values import evaluate as evaluate_macro
 from postproc.languages.krl.expressions import evaluate
 from postproc.toolpath import Toolpath
 
@@ -77,3 +79,14 @@ def rapid(condition: str) -> Toolpath:
 def test_a_number_that_is_whole_by_chance_decides_nothing_in_rapid() -> None:
     before_last = {one: rapid(one).predecessors.get(1) for one in ("x>8.9", "x>=9", "x=9", "x>9.1")}
     assert before_last == {"x>8.9": None, "x>=9": (-1, 0), "x=9": (-1, 0), "x>9.1": None}
+
+
+@pytest.mark.parametrize(
+    ("text", "decided"),
+    [("0.15*8 GE 1.2", None), ("0.45*20 EQ 9", None), ("FIX[0.1*10]", None), ("0.15*8 GT 1.1", 1.0), ("0.25*4 EQ 1", 1.0)],
+)  # fmt: skip
+def test_macros_of_fanuc_decide_nothing_by_their_last_digits(text: str, decided: float | None) -> None:
+    """LinuxCNC computes in double precision, as it is computed here."""
+    found = evaluate_macro(text, FANUC, lambda name: float("nan"))
+    assert np.isnan(found) if decided is None else found == decided
+    assert evaluate_macro(text, LINUXCNC, lambda name: float("nan")) == 1.0
