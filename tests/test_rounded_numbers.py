@@ -83,7 +83,8 @@ def test_a_number_that_is_whole_by_chance_decides_nothing_in_rapid() -> None:
 
 @pytest.mark.parametrize(
     ("text", "decided"),
-    [("0.15*8 GE 1.2", None), ("0.45*20 EQ 9", None), ("FIX[0.1*10]", None), ("0.15*8 GT 1.1", 1.0), ("0.25*4 EQ 1", 1.0)],
+    [("0.15*8 GE 1.2", None), ("0.45*20 EQ 9", None), ("FIX[0.1*10]", None), ("0.15*8 GT 1", 1.0),
+     ("0.25*4 EQ 1", 1.0)],
 )  # fmt: skip
 def test_macros_of_fanuc_decide_nothing_by_their_last_digits(text: str, decided: float | None) -> None:
     """LinuxCNC computes in double precision, as it is computed here."""
