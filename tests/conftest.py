@@ -20,7 +20,7 @@ if sys.dont_write_bytecode:
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 import valid_results  # before what it checks
-from tiers import choose_profile, mark_samples, stock_first
+from tiers import choose_profile, mark_samples, skip_when_late, stock_first
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is there
 
@@ -33,6 +33,10 @@ for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIG
         signal.signal(number, handler)
 
 
+def pytest_addoption(parser):
+    parser.addoption("--slow-minutes", type=float, help="skip slow tests that have not begun after so many minutes")
+
+
 def pytest_configure(config):
     choose_profile(config)
 
@@ -41,6 +45,11 @@ def pytest_configure(config):
 def pytest_collection_modifyitems(items):
     mark_samples(items)
     stock_first(items)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item):
+    skip_when_late(item)
 
 
 @pytest.hookimpl(wrapper=True)

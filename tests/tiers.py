@@ -2,15 +2,20 @@
 
 ``@pytest.mark.slow`` leaves a test to the second.  ``@pytest.mark.sample(k)`` leaves all but k of its parametrisations
 to it, which lie evenly from the first to the last.  ``examples(n)`` is how many examples a law tries: n, a tenth in the
-fast tier.
+fast tier.  ``--slow-minutes m`` bounds the time on a slow machine: slow tests not begun m minutes after the start are
+skipped, and say so.
 """
 
 from __future__ import annotations
 
 import os
+import time
 
 import pytest
 from hypothesis import settings
+
+BEGIN = time.monotonic()
+"""When this process began."""
 
 FAST = "not slow"
 """Of ``-m``, as pyproject.toml has it."""
@@ -45,6 +50,13 @@ def mark_samples(items: list[pytest.Item]) -> None:
         for k, item in enumerate(group):
             if not in_sample(k, len(group), count):
                 item.add_marker(pytest.mark.slow)
+
+
+def skip_when_late(item: pytest.Item) -> None:
+    """Skips a slow test if the minutes for such have passed since this process began."""
+    minutes = item.config.getoption("slow_minutes")
+    if minutes is not None and item.get_closest_marker("slow") and time.monotonic() - BEGIN > 60.0 * minutes:
+        pytest.skip(f"{minutes:g} minutes for slow tests had passed")
 
 
 STOCK = ("test_engage", "test_part_")
