@@ -123,7 +123,7 @@ def bases(body: list[str], pairs: dict[int, list[int]]) -> dict[int, set[int]]:
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=examples(1000))
+@settings(deadline=None, max_examples=examples(300))
 @given(programs())
 def test_a_base_that_is_known_is_that_of_every_way(body: list[str]) -> None:
     path, possible = read(body).toolpath, bases(body, blocks(body))
