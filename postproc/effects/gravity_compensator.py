@@ -107,7 +107,7 @@ class GravityCompensator(EnergyLoad):
     @classmethod
     def from_options(cls, options: YamlSection, joints: Sequence[Joint]) -> Self:
         options.only("joint", "preload", "sign", "zero_deg")
-        names = [joint.name for joint in joints if joint.kind == "revolute"]
+        names = [joint.name for joint in joints if joint.turns]
         name = options.text("joint", choices=names)
         return cls(
             joints,
@@ -125,7 +125,7 @@ class GravityCompensator(EnergyLoad):
     @classmethod
     def variants(cls, joints: Sequence[Joint]) -> tuple[Self, ...]:
         # across the shoulder, whatever carries the arm
-        turning = [index for index, joint in enumerate(joints) if joint.kind == "revolute"]
+        turning = [index for index, joint in enumerate(joints) if joint.turns]
         return (cls(joints, turning[1]),) if len(turning) > 1 else ()
 
     def described(self) -> dict[str, object]:
