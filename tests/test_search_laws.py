@@ -8,8 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from spring_cases import AT, MM, corrected, output, spring, with_ramp
+from test_ramp_points import END, bent, ramp_along
 
+from postproc.compensation import ramp_fits
 from postproc.compensation.path_error import PathSegments, path_errors_at
+from postproc.compensation.ramp_fits import CLOSE_STARTS, CloseFits
 from postproc.compensation.ramp_points import choose_ramp_points
 from postproc.compensation.subdivision import Limits
 from postproc.toolpath import Arcs, Kind
@@ -102,3 +105,33 @@ def test_the_curve_of_a_ramp_between_arcs_goes_on_to_the_next_points_of_the_outp
     assert ramps.arc.tolist() == [[True, True]]
     back = (before[0] if before else 0.0) - 1.0
     np.testing.assert_allclose(curves.ends, [[back * length[3], after * length[4]]], rtol=1e-9)
+
+
+@pytest.mark.parametrize("slope", [0.3, 0.8, 1.2])
+@pytest.mark.parametrize("number", range(len(CLOSE_STARTS)))
+def test_points_on_the_curve_stay_where_that_is_near_enough(slope, number, monkeypatch):
+    """As near to each other as lines may be short, beside both turns, and the vertex among them; each turn is looked at
+    once at most."""
+    turns = []
+    plain = ramp_fits.closest_to_turn
+
+    def noted(*words):  # type: ignore[no-untyped-def]
+        turns.append(words[-1])
+        return plain(*words)
+
+    monkeypatch.setattr(ramp_fits, "closest_to_turn", noted)
+    curve = bent(slope)
+    found = CloseFits().fit(ramp_along(curve), curve, number, 1.0)
+    assert found is not None
+    assert turns in ([], [0, 1])
+    x, y = found.place[:, 0], found.place[:, 1]
+    np.testing.assert_allclose(y, slope * np.clip(x, 0.0, END), atol=1e-9)
+    np.testing.assert_allclose(found.along, x, atol=1e-9)
+    assert abs(x[found.own]) < 1e-9
+    assert np.abs(x - END).min() < 1e-9
+    lines = np.linalg.norm(np.diff(found.place, axis=0), axis=1)
+    between = int(np.argmax(lines))  # from the points beside one turn to those beside the other
+    assert x[between] < 0.5 * END < x[between + 1]
+    short = np.delete(lines, between)
+    assert short.min() > 0.6 * MM - 1e-9
+    assert short.max() < 0.7 * MM
