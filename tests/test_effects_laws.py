@@ -10,7 +10,7 @@ from effect_cases import conditions, elastic, made, nulls, random_arm, with_term
 from plant import kr270, random_angles, random_tools, random_wrenches
 
 from postproc.base.findings import Refusal
-from postproc.base.geometry import Poses
+from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.base.yaml_section import parsed
 from postproc.effects import EFFECTS, ChainState, Conditions, Offset
 from postproc.effects.effect import Parameter
@@ -275,6 +275,30 @@ def test_a_link_without_length_does_not_grow():
             joints[number].name, Poses(place.rotation, np.array([0.0, length, 0.0])), -2.5, 2.5, "revolute"
         )
     assert [p.name for p in made("thermal_growth", joints).parameters] == ["g1", "g3", "g4", "g5", "g6"]
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.7, 0.5 * np.pi, 4.0])
+def test_a_first_joint_carries_weight_where_its_axis_leans(heading):
+    """To whatever side; about the vertical it only turns."""
+    first, *others = kr270().joints
+    for turn, leans in (
+        ([0, 0, heading], False),
+        (0.01 * np.array([np.cos(heading), np.sin(heading), 0]), True),
+    ):
+        place = Poses(
+            rotation_from_vector(np.array(turn)) @ first.placement.rotation, first.placement.position
+        )
+        effect = made("gravity_sag", (replace(first, placement=place), *others))
+        assert ({p.joint for p in effect.parameters} == {joint.name for joint in (first, *others)}) == leans
+        assert {joint.name for joint in others} <= {p.joint for p in effect.parameters}
+
+
+@names
+def test_gaps_are_those_of_the_joints_one_by_one(name):
+    effect = made(name, kr270().joints)
+    if effect.by_direction:
+        values = {p.name: 1e-4 * number for number, p in enumerate(effect.parameters)}
+        np.testing.assert_array_equal(effect.gaps(values), list(values.values()))
 
 
 # What acts

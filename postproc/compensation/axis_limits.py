@@ -131,7 +131,7 @@ class _LimitFindings:
         if self.near:
             margin, motion, axis = min(self.nearest)
             joint = robot.joints[axis]
-            unit, word = (DEG, "deg") if joint.kind == "revolute" else (MM, "mm")
+            unit, word = (DEG, "deg") if joint.turns else (MM, "mm")
             message = f"the correction moves {joint.name} to {margin / unit:.2f} {word} from its limit"
             findings.append(self._finding("KIN008", motion, message, self.near))
         if self.singular:
@@ -140,7 +140,7 @@ class _LimitFindings:
         if self.over:
             share, motion, axis = max(self.fastest, key=lambda one: one[0])
             joint, speed = robot.joints[axis], robot.speeds[axis]
-            unit, word = (DEG, "deg/s") if joint.kind == "revolute" else (MM, "mm/s")
+            unit, word = (DEG, "deg/s") if joint.turns else (MM, "mm/s")
             message = (
                 f"{joint.name} needs {share * speed / unit:.1f} {word} at the programmed feed,"
                 f" its speed limit is {speed / unit:g} {word}"

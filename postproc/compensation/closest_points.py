@@ -68,7 +68,7 @@ def closest_points(
     floor = np.full(curve.turn.shape[1], enough) if each_turn else np.zeros(1)
     points = curve.at(parameter)[0] if start is None else start
     best = _search(curve, points, parameter, reach, shortest, vertex, floor, enough * len(floor))
-    return best.points, float(best.largest[0]) if long_enough(best.points, shortest)[0] else np.inf
+    return best.points, float(best.largest[0]) if long_enough(best.points, shortest).all() else np.inf
 
 
 def closest_to_turn(
@@ -87,7 +87,7 @@ def closest_to_turn(
     floor = np.full(curve.turn.shape[1], FAR)
     floor[turn] = enough
     best = _search(curve, start, parameter, reach, shortest, vertex, floor, enough + FAR * (len(floor) - 1))
-    if not long_enough(best.points, shortest)[0]:
+    if not long_enough(best.points, shortest).all():
         return best.points, np.inf
     here = _turn_nearest(curve, best, len(floor)) == turn
     return best.points, float(np.linalg.norm(best.off[0][here], axis=1).max(initial=0.0))
@@ -107,18 +107,18 @@ def _search(
     ``floor`` (T,) [m] at least, and ``enough`` [m] together ends the search."""
     turns = len(floor)
     best = evaluate_polygons(curve, moved_apart(start, shortest), reach, None, parameter, vertex, True)
-    if not long_enough(best.points, shortest)[0]:
+    if not long_enough(best.points, shortest).all():
         return best
     past, box = [_sum_of_largest(best, _turn_nearest(curve, best, turns), floor)], FIRST
     for _ in range(STEPS):
         done = past[-1] <= enough or (len(past) > SOME and past[-1] > GAIN * past[-1 - SOME])
         if done or box < SHORTEST:
-            break
+            return best
         moved = best.points.copy()
         moved[0, 1:-1] += _step(best, curve, shortest[0], box, floor, _turn_nearest(curve, best, turns))
         found = evaluate_polygons(curve, moved, reach, best.parameter, best.label, vertex, True)
         size = _sum_of_largest(found, _turn_nearest(curve, found, turns), floor)
-        if long_enough(moved, shortest)[0] and size < past[-1]:
+        if long_enough(moved, shortest).all() and size < past[-1]:
             best, box = found, min(WIDER * box, LONGEST)
             past.append(size)
         else:

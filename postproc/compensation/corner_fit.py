@@ -79,7 +79,7 @@ def fit_corners(
         if better.all():
             return nearest, other
         if not better.any():
-            break
+            return fit, plain
         rows, before = rows[better], before[better]
     return fit, plain
 

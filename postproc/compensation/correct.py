@@ -382,7 +382,7 @@ def _axis_beyond(task: CompensationProblem, q: Floats) -> str:
     low, high = task.model.robot.limits.T
     axis = int(np.argmax(np.maximum(low - q, q - high)))
     joint = task.model.robot.joints[axis]
-    word, unit = ("deg", DEG) if joint.kind == "revolute" else ("mm", MM)
+    word, unit = ("deg", DEG) if joint.turns else ("mm", MM)
     return (
         f"{joint.name} is at {q[axis] / unit:.1f} {word},"
         f" beyond its limits {low[axis] / unit:g} .. {high[axis] / unit:g} {word}"

@@ -225,6 +225,7 @@ def _places(task: CompensationProblem, rows: Ints, share: Floats, command: Poses
     length = task.desired_path.length[row]
     at = share[some].copy()
     last, moved = np.full(len(some), np.nan), np.full(len(some), np.nan)
+    found = share.copy()
     for _ in range(SECANTS):
         real = task.simulated(row, there, task.force.along(row, at), share=at, corrected=True)
         goal = task.goal(row, task.desired_path.at(row, at), at)
@@ -234,11 +235,10 @@ def _places(task: CompensationProblem, rows: Ints, share: Floats, command: Poses
         slope = np.where(np.isfinite(slope), np.clip(slope, FLATTEST, 1.0 / FLATTEST), 1.0)
         step = np.where(real.settled & real.reachable, ahead / slope, 0.0)
         if not (np.abs(step) > SAME_PLACE).any():
-            break
+            return found
         last, moved = ahead, step
         at = np.clip(at + step / length, 0.0, 1.0)
-    found = share.copy()
-    found[some] = at
+        found[some] = at
     return found
 
 

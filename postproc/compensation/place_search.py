@@ -50,7 +50,7 @@ class PlacesBeside:
         asked, gaps = np.full((2, len(tools)), np.nan), np.full(len(tools), np.nan)
         for _ in range(ROUNDS):
             if not len(active):
-                break
+                return
             at = brackets.secants(active)
             part = np.clip(np.searchsorted(begins, at, "right") - 1, 0, len(length) - 1)
             along = np.clip((at - begins[part]) / np.maximum(length[part], settled), 0.0, 1.0)

@@ -154,7 +154,7 @@ def fit_points(
     for _ in range(STEPS):
         some = np.flatnonzero((largest > enough) & (trust > SHORTEST))
         if not len(some):
-            break
+            return best.points, largest
         off, slope = best.off[some], best.slope[some]
         step = least_largest(off, slope, damping[some]).reshape(len(some), -1, 3)
         step *= np.minimum(1.0, trust[some] / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-15))[:, None, None]
@@ -196,7 +196,7 @@ def moved_apart(points: Floats, shortest: Floats) -> Floats:
         size = _sizes(step)
         lack = np.maximum(shortest - size, 0.0)
         if not lack.any():
-            break
+            return points
         push = (lack / np.maximum(size, 1e-12))[..., None] * step
         points = points.copy()
         points[:, 1:] += share[:, None] * push

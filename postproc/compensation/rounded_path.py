@@ -220,7 +220,7 @@ class RoundedOutput:
             brackets.narrow(active, between[active], gap)
             active = active[np.abs(gap) > AT_TURN]
             if not len(active):
-                break
+                return
 
     def blend(self, at: Ints, share: Floats) -> Blend:
         """Where the shares (S,) of the segments ``at`` (S,) lie on parabolas."""

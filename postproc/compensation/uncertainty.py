@@ -113,7 +113,7 @@ def evaluate_uncertainty(
         return uncertainty
     worst = int(np.nanargmax(result.before))
     place = np.array([worst])
-    moved = error_sensitivities(task, known.without_interval, place, task.wanted[place])[1][0]
+    _, (moved,) = error_sensitivities(task, known.without_interval, place, task.wanted[place])
     length = np.linalg.norm(moved, axis=0) * [0.1 * abs(entry.value) for entry in known.without_interval]
     tenth = tuple(
         (known.without_interval[i].name, float(length[i])) for i in np.argsort(-length, kind="stable")

@@ -249,13 +249,13 @@ def per_joint(
     return tuple(
         Parameter(
             f"{letter}{i}",
-            units[joint.kind != "revolute"],
+            units[not joint.turns],
             null,
             lower,
             upper,
             source,
             joint.name,
-            plausible=plausible if joint.kind == "revolute" else (0.0, math.inf),
+            plausible=plausible if joint.turns else (0.0, math.inf),
         )
         for i, joint in enumerate(joints, 1)
     )

@@ -30,6 +30,9 @@ from postproc.robot.geometries import Joint
 
 _SOURCE = "Klimchik et al., Fig. 1 and eqs (1)-(4)"
 
+SIGNS = {"energy": 1.0, "as_printed": -1.0}
+"""Of the change of the torque, by the option ``sign``."""
+
 SPRING, LEVER = (1e3, 1e9), (0.01, 10.0)
 """[N/m], [m] Springs and lengths of built compensators lie between these."""
 
@@ -107,13 +110,13 @@ class GravityCompensator(EnergyLoad):
     @classmethod
     def from_options(cls, options: YamlSection, joints: Sequence[Joint]) -> Self:
         options.only("joint", "preload", "sign", "zero_deg")
-        names = [joint.name for joint in joints if joint.kind == "revolute"]
+        names = [joint.name for joint in joints if joint.turns]
         name = options.text("joint", choices=names)
         return cls(
             joints,
             [joint.name for joint in joints].index(name),
             options.text("preload", "balanced", ("balanced", "acting")),
-            options.text("sign", "energy", ("energy", "as_printed")),
+            options.text("sign", "energy", tuple(SIGNS)),
             options.number("zero_deg", 0.0, -360.0, 360.0) * DEG,
         )
 
@@ -125,7 +128,7 @@ class GravityCompensator(EnergyLoad):
     @classmethod
     def variants(cls, joints: Sequence[Joint]) -> tuple[Self, ...]:
         # across the shoulder, whatever carries the arm
-        turning = [index for index, joint in enumerate(joints) if joint.kind == "revolute"]
+        turning = [index for index, joint in enumerate(joints) if joint.turns]
         return (cls(joints, turning[1]),) if len(turning) > 1 else ()
 
     def described(self) -> dict[str, object]:
@@ -150,11 +153,11 @@ class GravityCompensator(EnergyLoad):
         row = state.chain.motor_rows[self.joint]
         here = self.spring(values, state.coordinates[row])
         rest = self.spring(values, state.rest[row]).torque
-        sign = 1.0 if self.sign == "energy" else -1.0
-        force[row] += sign * (here.torque - rest) + (rest if self.preload == "acting" else 0.0)
+        sign = SIGNS[self.sign]
+        force[row] += sign * (here.torque - rest) + (0.0 if self.zero_without_load else rest)
         slope[row] += sign * here.slope
 
     def energy(self, values: Values, state: ChainState) -> Floats:
         row = state.chain.motor_rows[self.joint]
-        rest = self.spring(values, state.rest[row]).torque if self.preload == "balanced" else 0.0
+        rest = self.spring(values, state.rest[row]).torque if self.zero_without_load else 0.0
         return np.asarray(self.spring(values, state.coordinates[row]).energy + rest * state.coordinates[row])

@@ -33,7 +33,7 @@ class GravitySag(Offset):
     whole = True
 
     def __init__(self, joints: Sequence[Joint]) -> None:
-        turning = [i for i, joint in enumerate(joints) if joint.kind == "revolute"]
+        turning = [i for i, joint in enumerate(joints) if joint.turns]
         chain = Chain(joints, Poses.identity())
         at_zero = chain.evaluate(chain.placed(np.zeros((1, len(joints)))), Poses.identity())
         first = at_zero.links[turning[0]][2][:, 0] if turning else np.zeros(3)

@@ -27,7 +27,7 @@ class TransmissionError(Offset):
         self._waves = [
             (i, harmonic, wave)
             for i, joint in enumerate(joints)
-            if joint.kind == "revolute"
+            if joint.turns
             for harmonic in self.harmonics
             for wave in "sc"
         ]

@@ -45,6 +45,11 @@ class Joint:
     kind: str = "revolute"
     passive: tuple[Passive, ...] = ()
 
+    @property
+    def turns(self) -> bool:
+        """It turns about its axis, and does not move along it."""
+        return self.kind == "revolute"
+
 
 @dataclass(frozen=True)
 class Follower:

@@ -160,9 +160,8 @@ class OpenBlocks:
             assert isinstance(item, Statement)
             self._report_length(item)
             return at
-        if self.spent_not_followed > BUDGET and self.shallow is False:
-            self.shallow = True
         if self.spent_not_followed > BUDGET:
+            self.shallow = True
             first = next((i for i, frame in enumerate(self.stack) if not frame.followed), 0)
             inner = next((frame for frame in self.stack[first:] if frame.repeats), None)
             if inner is not None:

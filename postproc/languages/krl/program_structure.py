@@ -275,8 +275,7 @@ class _Surveyor:
             return
         if len(self.stack) > 1:
             self._pop(index, 1, proper=False)
-        self.stack[0].end = index
-        self.stack.clear()
+        self.stack.pop().end = index
         self.routine = None
 
     def note(self, statement: Statement) -> None:
