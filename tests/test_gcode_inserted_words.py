@@ -46,6 +46,9 @@ ISO_STATES = (
     "G777",
     "zzz",
 )
+ISO_BESIDE = ("G1 X8.5 M8", "G69 X6.5")
+"""Motions beside a code; spindle, feed of an axis and tool change make no difference any more in such a block."""
+ISO_BESIDE_WORDS = tuple(word for word in ISO_WORDS if word not in ("E8.25", "S777", "T7", "M6"))
 SINUMERIK_MOTIONS = (
     "G1 X5.5 Y6.5 F100", "X7.5", "G2 X11.5 Y2.5 I=5 J=0", "G3 X3.5 Y4.5 CR=9", "X=R1+1",
 )  # fmt: skip
@@ -82,8 +85,10 @@ def signature(program: Program) -> list[str]:
 GROUPS = (
     ("linuxcnc", ISO_MOTIONS, ISO_WORDS),
     ("linuxcnc", ISO_OTHERS, ISO_STATES),
+    ("linuxcnc", ISO_BESIDE, ISO_BESIDE_WORDS),
     ("fanuc", ISO_MOTIONS, ISO_WORDS),
     ("fanuc", ISO_OTHERS, ISO_STATES),
+    ("fanuc", ISO_BESIDE, ISO_BESIDE_WORDS),
     ("sinumerik", SINUMERIK_MOTIONS, SINUMERIK_WORDS),
     ("sinumerik", SINUMERIK_OTHERS, SINUMERIK_STATES),
 )

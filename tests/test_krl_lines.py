@@ -185,6 +185,11 @@ def test_declarations(
     assert declaration(code, 100) == Declared(kind, is_global, items, b"CONST" in code)
 
 
+@pytest.mark.parametrize("code", [b"CONST INT a=5", b"DECL CONST INT a=5", b"GLOBAL CONST REAL a=5.5"])
+def test_a_constant_is_declared_with_and_without_decl(code: bytes) -> None:
+    assert stated(code).kind == "declaration"
+
+
 @pytest.mark.parametrize("code", [b"DECL INTERRUPT x", b"DECL DECL x", b"INT", b"INT 5", b"INT  ", b"x=5"])
 def test_what_is_no_declaration(code: bytes) -> None:
     assert declaration(code, 0) is None

@@ -169,13 +169,13 @@ FANUC = Control(
                 (
                     Group.MOTION,
                     Move.OTHER,
-                    (2.2, 3.2, 2.3, 3.3, 2.4, 3.4, 12, 13, 70, 71, 72, 75, 77, 78, 150),
+                    (2.2, 3.2, 2.3, 3.3, 2.4, 3.4, 12, 13, 34, 35, 36, 37.1, 70, 71, 72, 75, 77, 78, 150),
                 ),
                 (Group.MOTION, Move.SPLINE, (6.2,)),
                 (Group.TCP, 1, (43.4, 43.5, 234)),
                 (Group.LENGTHS, 1, (43.1, 43.2, 43.3, 43.7, 44, 45, 46, 47, 48)),
                 *((Group.OFFSET, 101 + n, (110 + n,)) for n in range(20)),
-                (Group.MOTION, Move.THREAD, (32, 35, 36)),
+                (Group.MOTION, Move.THREAD, (32,)),
                 (
                     Group.RADIUS,
                     1,

@@ -10,7 +10,7 @@ from postproc.base.findings import Finding
 from postproc.languages.dialect import ReadingSettings
 from postproc.languages.gcode.blocks import AXES, BlockWords
 from postproc.languages.gcode.cell_options import INTEGER_WORDS
-from postproc.languages.gcode.control import Group, Once
+from postproc.languages.gcode.control import Group, Move, Once
 from postproc.languages.gcode.correctability import UNUSED, code_name
 from postproc.languages.gcode.execution_flow import CALLS, FlowReason
 from postproc.languages.gcode.numbered import written_lengths
@@ -76,6 +76,8 @@ def diagnostics(
     add(modal.unused & ~motion, "GCO001", UNUSED)
     probing = modal.has(Once.PROBE) & ~motion
     add(probing, "GCO001", "the block is a probing move without axes")
+    hidden = modal.states & (words.move == Move.OTHER) & ~motion & ~probing & words.control.iso
+    add(hidden, "GCO016", "the block may be a motion of the control without words of axes")
     calls, m = none.copy(), words.words(key("M"))
     calls[m.block[np.isin(m.value, CALLS)]] = True
     calls |= modal.has(Once.CALL) | words.noted("call") | words.has(*words.control.calls)
@@ -127,9 +129,10 @@ def diagnostics(
         add(first, "GCO021", "the program names no tool; tool 1 of the cell is assumed")
     if words.integers.message:
         whole = none.copy()
-        hows = np.stack([words.how(axis) for axis in AXES[:3]], axis=1) == How.INTEGER
-        values = np.stack([words.number(axis) for axis in AXES[:3]], axis=1)
-        whole[rows] = (hows & (values != 0))[rows].any(axis=1)
+        for letter in "XYZIJKR":
+            column = words.words(key(letter))
+            whole[column.block[(column.how == How.INTEGER) & (column.value != 0)]] = True
+        whole &= motion | modal.has(Once.CALL)
         add(whole, "GCO027", words.integers.message)
     if settings.options.get(INTEGER_WORDS) == "um" and not words.control.increments:
         whole = none.copy()

@@ -22,6 +22,7 @@ from postproc.languages.gcode.execution_flow import (
     tape_blocks,
     uncertain_stretches,
 )
+from postproc.languages.gcode.integer_words import PLAIN_INTEGERS, IntegerWords
 from postproc.languages.gcode.run_calls import RunAgain
 from postproc.languages.gcode.run_flow import RunFlow
 from postproc.languages.gcode.run_state import SUBPROGRAM
@@ -87,10 +88,15 @@ class Execution:
 
 
 def execute(
-    source: Source, control: Control, symbols: Mapping[str, object], own: int | None = None
+    source: Source,
+    control: Control,
+    symbols: Mapping[str, object],
+    own: int | None = None,
+    integers: IntegerWords = PLAIN_INTEGERS,
 ) -> Execution:
     """The run of a program; ``symbols``: values of names that only the controller knows; own: blocks of the program
-    itself: those after them are of other files, and where they do not run they are not in the run."""
+    itself: those after them are of other files, and where they do not run they are not in the run; integers: what
+    lengths without a decimal point mean."""
     n = len(source.blocks)
     nothing = np.zeros(n, np.bool_)
     tape = tape_blocks(source)
@@ -118,7 +124,9 @@ def execute(
         opaque: set[int] = set()
         steps = 0
         for _ in range(RESTARTS):
-            run = RunFlow(source, control, VariableValues(language, known, control.name), shape, opaque)
+            run = RunFlow(
+                source, control, VariableValues(language, known, control.name), shape, opaque, integers
+            )
             try:
                 return _result(run, run.follow(), True, own)
             except RunAgain:
@@ -133,6 +141,7 @@ def execute(
         VariableValues(language, known, control.name),
         Structure({}, {}, {}, followed=False),
         set(),
+        integers,
     )
     return _in_text_order(run)
 

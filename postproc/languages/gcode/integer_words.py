@@ -28,6 +28,10 @@ class IntegerWords(NamedTuple):
     message: str = ""
 
 
+PLAIN_INTEGERS = IntegerWords(False)
+"""They are mm (or inch)."""
+
+
 def integer_words(source: Source, control: Control, stated: str) -> IntegerWords:
     """What length words without a decimal point mean in a program; ``stated``: "mm" or "um" by the cell, or ""."""
     if not control.increments or stated:

@@ -176,6 +176,10 @@ _PLAIN = (
     Group.LENGTH, Group.RADIUS, Group.RETURN,
 )  # fmt: skip
 """Groups whose codes have no words of their own, but those in ``_OWN``."""
+_ENDS = (Group.TURNED, Group.SCALED, Group.POLAR, Group.PLACED, Group.SPINDLE)
+"""Groups of modes whose end has none either (G69, G50, G15, G97)."""
+_WORDLESS_M = (*range(10), 13, 14, 30, 48, 49, 60)
+"""M codes of stops, spindle, tool change and coolant, which use none of these words beside a motion."""
 _OWN = {"P": (540, 541, 1540, 640), "Q": (640,)}
 """Tenfold numbers of the codes of these groups that have such words: G54.1 P, G54 P, G154 P, G64 P Q."""
 _WORDLESS = (Move.RAPID, Move.LINE, Move.NOTHING, UNKNOWN)
@@ -200,8 +204,10 @@ def _unused(
     # P gives the turns of an arc of some controls only.
     straight = "LQ" if control.turns[0] == key("P") else "LQP"
     using = np.zeros(n, np.bool_)  # a code that is free to have any word
-    using[blocks[~np.isin(groups, _PLAIN)]] = True
-    using |= source.mask(key("M")) | force[Group.MACRO].astype(bool) | force[Group.FOREIGN].astype(bool)
+    using[blocks[~np.isin(groups, _PLAIN) & ~(np.isin(groups, _ENDS) & (values == 0))]] = True
+    m, axis = source.column(key("M")), source.mask(*(key(letter) for letter in "XYZABC"))
+    using[m.block[~np.isin(m.value, _WORDLESS_M) | ~axis[m.block]]] = True
+    using |= force[Group.MACRO].astype(bool) | force[Group.FOREIGN].astype(bool)
     move = force[Group.MOTION]
     using |= ~np.isin(move, (*_WORDLESS, *_CURVED))
     curved = np.isin(move, _CURVED)
@@ -212,6 +218,11 @@ def _unused(
         own = np.zeros(n, np.bool_)
         own[blocks[np.isin(number, _OWN.get(letter, ()))]] = True
         unused |= has & ~using & ~own & ~(curved & (letter not in straight))
+    if control.increments:
+        # X of a dwell is a time; beside P, or with other axes, controls of this kind have no meaning for it
+        dwells = np.zeros(n, np.bool_)
+        dwells[blocks[number == 40]] = True
+        unused |= dwells & axis & (source.mask(key("P")) | source.mask(*(key(letter) for letter in "YZABC")))
     return unused
 
 

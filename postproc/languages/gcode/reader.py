@@ -94,7 +94,8 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     joined = join(document.raw, settings.siblings, control)
     text = joined.source
     integers = integer_words(text, control, settings.options.get(INTEGER_WORDS, ""))
-    execution = execute(text, control, settings.symbols, joined.blocks if joined.files else None)
+    own = joined.blocks if joined.files else None
+    execution = execute(text, control, settings.symbols, own, integers)
     if joined.files and not execution.followed:
         return read(documents, control, replace(settings, siblings=()))
     offsets_in_text = execution.source.blocks.start

@@ -11,12 +11,15 @@ from postproc.base.arrays import Bools
 from postproc.languages.gcode.run_labels import called_name
 from postproc.languages.gcode.run_state import CallFrame, RunState
 from postproc.languages.gcode.statements import FlowStatement, NotFollowed
+from postproc.languages.gcode.words import How, key
 
 DEEPEST_CALL = 20
 PACKED = 10_000
 """M98 P031234 calls O1234 three times."""
 _ARGUMENTS = dict(zip("ABCIJKDEFHMQRSTUVWXYZ", (*range(1, 10), 11, 13, *range(17, 27)), strict=True))
 """Letters of G65 -> the numbers of their variables."""
+_COUNTS = "DEFHMST"
+"""Letters that are no lengths or angles."""
 
 
 class RunAgain(Exception):
@@ -100,8 +103,8 @@ class RunCalls(RunState):
             part = self.labels.program(f"L{number:.0f}") if not math.isnan(number) else None
             return None if part is None or runs is None else (*part, runs, self.variables.own())
         number, runs = self.word(block, "P"), self.runs(block, "L")
-        if verb == "call" and self.last_word(block, "Q") >= 0:
-            return None  # it starts at a block of the subprogram
+        if verb == "call" and any(self.last_word(block, letter) >= 0 for letter in "DHIJKQR"):
+            return None  # it starts at a block of the subprogram (H, Q), or what the word does is not known
         if math.isnan(number) or number != math.floor(number) or runs is None:
             return None
         if verb == "local":
@@ -113,10 +116,23 @@ class RunCalls(RunState):
         if part is None:
             return None
         if verb == "macro":
-            words = {letter: self.word(block, letter) for letter in _ARGUMENTS}
+            words = {letter: self.argument(block, letter) for letter in _ARGUMENTS}
             given = {f"#{_ARGUMENTS[one]}": value for one, value in words.items() if not math.isnan(value)}
             return (*part, runs, given)
         return (*part, runs, None)
+
+    def argument(self, block: int, letter: str) -> float:
+        """What a word of G65 states, NaN without; of a length in increments that is not known."""
+        at = self.last_word(block, letter)
+        counts = self.integer_words.increments or self.integer_words.ambiguous
+        if (
+            counts
+            and letter not in _COUNTS
+            and at >= 0
+            and self.source.column(key(letter)).how[at] == How.INTEGER
+        ):
+            return math.nan
+        return self.word(block, letter)
 
     def runs(self, block: int, letter: str) -> int | None:
         """How often a call runs, by the word of this letter; None where that is not known."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.languages.gcode.control import Control
 from postproc.languages.gcode.execution_flow import LOCAL, RETURNS, tape_blocks
+from postproc.languages.gcode.integer_words import IntegerWords
 from postproc.languages.gcode.lexing import FARTHEST
 from postproc.languages.gcode.run_labels import RunLabels
 from postproc.languages.gcode.source import Source
@@ -48,10 +49,16 @@ class RunState:
     """One attempt at following a program; ``opaque``: blocks of constructs and calls that may run or not."""
 
     def __init__(
-        self, source: Source, control: Control, variables: VariableValues, shape: Structure, opaque: set[int]
+        self,
+        source: Source,
+        control: Control,
+        variables: VariableValues,
+        shape: Structure,
+        opaque: set[int],
+        integer_words: IntegerWords,
     ) -> None:
         self.source, self.control, self.variables = source, control, variables
-        self.shape, self.opaque = shape, opaque
+        self.shape, self.opaque, self.integer_words = shape, opaque, integer_words
         self.n = len(source.blocks)
         self.values = by_block(source.notes, "value")
         self.assigned = by_block(source.notes, "assign")

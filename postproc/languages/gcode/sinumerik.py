@@ -64,7 +64,7 @@ _NUMBERED: tuple[tuple[Group, int, tuple[float, ...]], ...] = (
     (Group.ONCE, Once.OTHER, (25, 26, 110, 111, 112)),
     (Group.ONCE, Once.HOME, (74, 75, 76)),
     (Group.ONCE, Once.MACHINE, (53, 153)),
-    (Group.ONCE, Once.FRAME, (58, 59)),
+    (Group.ONCE, Once.FRAME, (58, 59, 158, 258, 259)),
     (
         Group.NONE,
         0,

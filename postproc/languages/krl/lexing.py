@@ -320,7 +320,7 @@ def _kind(word: bytes, code: bytes, at: int) -> tuple[StatementKind, Said]:
         return StatementKind(word.decode().lower()), None
     if word in SYSTEM_WORDS:
         return StatementKind.SYSTEM, None
-    if word == b"DECL" or word in TYPES or word == b"GLOBAL":
+    if word in (b"DECL", b"GLOBAL", b"CONST") or word in TYPES:
         declared = declaration(code, at)
         if declared is not None:
             return StatementKind.DECLARATION, declared
