@@ -2,13 +2,15 @@
 
     python -m tests.benchmarks.stock --sizes 1000,4000,16000 [--stock 1,2,4] [--part 100000]
     python -m tests.benchmarks.stock --sizes 3000,10000 --five-axes [--beside] [--lists]
+    python -m tests.benchmarks.stock --levels 5
 
 Zigzag in levels of 2 mm of 4 mm between the rows, motions of 1 mm, a cutter of 16 mm; every level ends with a rapid.
 ``--stock``: the block of the last size made so many times larger in each direction of the plane.  ``--five-axes``: a
 ball of 10 mm in rows of 0.5 mm and levels of 0.5 mm, whose spindle swings by 17 deg to either side along its rows; a
 level has 41,200 motions, so more motions cut what more rows have cut before.  ``--beside``: all rows in one level, in a
 blank as wide as they need.  ``--lists``: no times, but among how many sweeps the stock looks: for the mean entry of a
-list, the entries of its cell.
+list, the entries of its cell.  ``--levels``: the processor time of a place of the ball in each of so many levels of a
+block of 30 by 12 mm.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+import stock_cases
 from part_cases import constant, sweeps_of
 from stock_cases import BALL, FLAT, block, path_through, run
 
@@ -30,6 +33,8 @@ from postproc.part.deflected_sweeps import deflect
 from postproc.part.surface import find_surface
 from postproc.part.surface_error import find_errors
 from postproc.process.stock.cells import build_stock
+from postproc.process.stock.contact import COLUMNS, SweepCutters, contacts
+from postproc.process.stock.engagement import laws_of, profiles_of
 
 LENGTH, WIDTH, LEVEL = 200.0, 100.0, 2.0
 
@@ -52,13 +57,15 @@ def program(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array(points[:count]), np.array(kinds[:count])
 
 
-def ball_program(count: int, beside: bool = False) -> tuple[np.ndarray, np.ndarray]:
+def ball_program(
+    count: int, beside: bool = False, length: float = LENGTH, width: float = WIDTH
+) -> tuple[np.ndarray, np.ndarray]:
     """(count, 3) tip positions [mm] and spindle directions (count, 3) of rows in levels, or ``beside`` one another."""
-    row = np.arange(-3, LENGTH + 3, 1.0)
+    row = np.arange(-3, length + 3, 1.0)
     many = np.arange(count)
     index, place = many // len(row), many % len(row)
     x = row[np.where(index % 2 == 0, place, len(row) - 1 - place)]
-    across = count if beside else 2 * int(WIDTH)
+    across = count if beside else 2 * int(width)
     y, level = 0.5 * (index % across), index // across
     z = -0.5 * (level + 1) - 0.3 * np.sin(x / 15) - 0.3
     lean = np.column_stack([0 * x, np.sin(0.3 * np.sin(x / 20)), np.cos(0.3 * np.sin(x / 20))])
@@ -92,6 +99,26 @@ def measure_lists(count: int, beside: bool) -> tuple[float, int, float]:
     return stock.grid[0] * 1e3, int(entries.sum()), float((entries**2).sum() / entries.sum())
 
 
+def measure_levels(levels: int, places: int = 100) -> list[float]:
+    """Processor time [us] of a place in each level, of as many in its middle rows."""
+    length, width = 30.0, 12.0
+    of_level = int(length + 6) * 2 * int(width)
+    path = path_through(*ball_program(levels * of_level, False, length, width))
+    blank = block([0, 0, -60], [length, width, 0])
+    sweeps, edges = stock_cases.sweeps_of(path, blank, BALL)
+    stock, live = build_stock(blank, np.ascontiguousarray(sweeps.rows), np.array([BALL.numbers]))
+    cutting = SweepCutters(profiles_of(sweeps.cutters), laws_of(sweeps, path, edges), live, sweeps.heading)
+    random, times = np.random.default_rng(1), []
+    contacts(stock, cutting, np.zeros(1, int), np.full(1, 0.5), np.zeros((1, COLUMNS)))  # compiles
+    for level in range(levels):
+        rows = level * of_level + np.arange(of_level // 3, of_level * 5 // 6)
+        sweep, found = np.sort(random.choice(rows, places, replace=False)), np.zeros((places, COLUMNS))
+        start = time.process_time()
+        contacts(stock, cutting, sweep, np.full(places, 0.5), found)
+        times.append((time.process_time() - start) / places * 1e6)
+    return times
+
+
 def measure_part(count: int, points: int) -> tuple[float, ...]:
     """Motions, points, those of the program, processor seconds of surface, deflected sweeps and errors, memory [GB]."""
     sweeps, stock = sweeps_of(
@@ -120,7 +147,13 @@ def main() -> None:
     parser.add_argument("--five-axes", action="store_true")
     parser.add_argument("--beside", action="store_true")
     parser.add_argument("--lists", action="store_true")
+    parser.add_argument("--levels", type=int, default=0)
     given = parser.parse_args()
+    if given.levels:
+        print("level  us a place")
+        for level, used in enumerate(measure_levels(given.levels)):
+            print(f"{level + 1:5}  {used:10.0f}")
+        return
     if given.lists:
         print("motions  cells mm  entries   of its cell")
         for word in given.sizes.split(","):
