@@ -34,7 +34,9 @@ for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIG
 
 
 def pytest_addoption(parser):
-    parser.addoption("--slow-minutes", type=float, help="skip slow tests that have not begun after so many minutes")
+    parser.addoption(
+        "--slow-minutes", type=float, help="skip slow tests that have not begun after so many minutes"
+    )
 
 
 def pytest_configure(config):
