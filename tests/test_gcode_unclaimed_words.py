@@ -98,3 +98,15 @@ def test_a_call_with_a_word_of_unknown_meaning_is_not_followed(word: str) -> Non
 @pytest.mark.parametrize("frame", ["G158 X5", "G258 RPL=30", "G259 RPL=30"])
 def test_frames_of_older_sinumerik_are_not_passed_over(frame: str) -> None:
     assert ends("sinumerik", f"G1 X1 Y1 Z1\n{frame}\nG1 X1 Y1 Z1\n") == ["1 1 1", "?"]
+
+
+@pytest.mark.parametrize("number", ["1e-05", "5E-1", "1E3", "5.e+2"])
+@pytest.mark.parametrize("name", ["linuxcnc", "fanuc", "sinumerik"])
+def test_an_exponent_is_taken_by_some_controls_only(name: str, number: str) -> None:
+    """A program in C reads 1e-05 as a number, LinuxCNC as 1 and the address E."""
+    assert ends(name, f"G1 X{number}\nG1 X6. Y3.\n") == ["?", "6 3 0"]
+    assert "GCO005" in codes(name, f"G1 Y{number} X2.\n")
+
+
+def test_an_address_e_of_its_own_is_no_exponent() -> None:
+    assert ends("linuxcnc", "G1 X5.E0.1\nX6. E-1\n") == ["5 0 0", "6 0 0"]

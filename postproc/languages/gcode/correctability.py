@@ -135,7 +135,7 @@ def check_correctability(
     refuse(
         unread[rows],
         "GCO005",
-        "a word is an expression, a variable or far beyond the size of any machine",
+        "a word is an expression, a variable, a number with an exponent or far beyond the size of any machine",
         unbound,
     )
     quiet = np.isin(moves.move, (-1, Move.NOTHING))

@@ -252,6 +252,12 @@ def _in_order(plain: _Plain, other: _Plain) -> _Plain:
     return _Plain(*(np.concatenate(pair)[order] for pair in pairs))
 
 
+def _with_exponent(words: _Plain) -> Bools:
+    """Which words ``X1e-05`` are: a program in C takes the exponent, LinuxCNC an address E; X1E0.5 is the latter alone."""
+    exponent = (words.key[1:] == ord("E")) & (words.how[1:] == How.INTEGER) & (words.at[1:] == words.stop[:-1])
+    return np.append(exponent & (words.start[:-1] >= 0), np.zeros(min(len(words.key), 1), np.bool_))
+
+
 def _joined(
     feeds: Ints, plain: _Plain, other: _Other, starts: Ints, ends: Ints
 ) -> tuple[WordArrays, BlockSpans, tuple[Note, ...]]:
@@ -264,7 +270,8 @@ def _joined(
     some[other.commented] = True
     used = np.flatnonzero(some)
     far = (np.abs(value) > FARTHEST) & np.isin(key & 0xFF, COORDINATES)
-    value[far], how[far] = np.nan, How.UNREAD
+    unread = far | _with_exponent(all_words)
+    value[unread], how[unread] = np.nan, How.UNREAD
     block = np.searchsorted(used, lines)
     words = WordArrays(all_words.at, all_words.start, all_words.stop, key, value, how, block)
     deleted = np.zeros(len(starts), np.bool_)
