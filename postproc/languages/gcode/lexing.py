@@ -254,7 +254,9 @@ def _in_order(plain: _Plain, other: _Plain) -> _Plain:
 
 def _with_exponent(words: _Plain) -> Bools:
     """Which words ``X1e-05`` are: C programs read the exponent, LinuxCNC an address E; X1E0.5 is the latter alone."""
-    exponent = (words.key[1:] == ord("E")) & (words.how[1:] == How.INTEGER) & (words.at[1:] == words.stop[:-1])
+    exponent = (
+        (words.key[1:] == ord("E")) & (words.how[1:] == How.INTEGER) & (words.at[1:] == words.stop[:-1])
+    )
     return np.append(exponent & (words.start[:-1] >= 0), np.zeros(min(len(words.key), 1), np.bool_))
 
 
