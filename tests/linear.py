@@ -384,6 +384,13 @@ def _measured(case: Case, size: int, longest: int, send) -> None:
     send.send(Cost(seconds, (peak - before) / 1024, error))
 
 
+def is_linear(case: Case, size: int = 50_000) -> bool:
+    """Whether four times as much of ``size`` bytes takes less than eight times as long, where square growth takes 16:
+    what else runs on the machine changes times of the processor by less than half."""
+    few, many = (min(measure(case, each).seconds for _ in range(2)) for each in (size, 4 * size))
+    return many < 8 * few
+
+
 def import_readers() -> None:
     """So that no process measures imports."""
     for name in (
