@@ -83,6 +83,8 @@ def test_arguments_in_increments_are_not_known() -> None:
     # 900000 is a coordinate in increments only: X5 of G65 is then 0.005, if the machine is set so
     counted = "G1 X900000\nG65 P5 X5 Y6.\n" + SUB
     assert ends("fanuc", counted)[:2] == ["900 0 0", "?"]
+    assert ends("fanuc", counted.replace("X5 ", "X5. "))[:2] == ["900 0 0", "5 6 0"]
+    assert ends("fanuc", counted.replace("X5 Y6.", "X5 Y6"))[:2] == ["900 0 0", "?"]
     assert "GCO027" in codes("fanuc", "G65 P5 X5 Y6.\n" + SUB)
     assert "GCO027" in codes("fanuc", "G2 X10. Y0. I5 J0.\n")
     assert "GCO027" not in codes("fanuc", "G65 P5 X5. Y6.\n" + SUB)
