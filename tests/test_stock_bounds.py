@@ -15,6 +15,7 @@ from postproc.process.stock.bounds import (
     set_bound,
     set_plane,
 )
+from postproc.process.stock.cells import build_stock, stock_distance
 from postproc.process.stock.distance import pose_distance
 
 
@@ -87,3 +88,39 @@ def test_a_plane_is_a_lower_bound_in_all_of_its_cell(five):
                     close += least < 0.0 or bound > least - 0.15e-3
     assert bounded > 100
     assert close > 0.7 * bounded
+
+
+def test_the_stock_of_any_time_is_what_the_sweeps_before_it_left():
+    """Against the least distance of all places of all sweeps before that time, whichever the stock asks first."""
+    blank, cutters = block([30, 10, -40], [70, 50, 0]), np.array([BALL.numbers])
+    rng = np.random.default_rng(7)
+    cut = earlier = 0
+    for seed in range(6):
+        rows = np.ascontiguousarray(sweeps_of(path_through(*random_path(seed, True)), blank, BALL)[0].rows)
+        stock, _ = build_stock(blank, rows, cutters)
+        reach = stock.grid[1]
+        for _ in range(60):
+            j = rng.integers(len(rows))
+            tip = rows[j, :3] + rng.uniform() * rows[j, 3:6]
+            away = rng.normal(0, 1, 3)
+            away -= 2 * max(away @ rows[j, 6:9], 0.0) * rows[j, 6:9]  # below the ball's middle
+            x, y, z = (
+                tip + 5e-3 * rows[j, 6:9] + (5e-3 + rng.uniform(-1, 1) * reach) * away / np.linalg.norm(away)
+            )
+            faces = min(x - 30e-3, 70e-3 - x, y - 10e-3, 50e-3 - y, z + 40e-3, -z)
+            if faces <= 0.0:
+                continue
+            least = [
+                min(pose_distance(rows, cutters, k, share, x, y, z) for share in np.linspace(0, 1, 101))
+                for k in range(len(rows))
+            ]
+            for time in (int(j), int(j) + 1, len(rows)):
+                found, true = stock_distance(stock, x, y, z, time), min([reach, faces, *least[:time]])
+                if true > 1e-6:
+                    assert found == pytest.approx(true, abs=2e-6)
+                    cut += true < min(reach, faces)
+                else:
+                    assert found < 2e-6
+            earlier += min([reach, *least[:j]]) > min(least[: j + 1])
+    assert cut > 50
+    assert earlier > 20

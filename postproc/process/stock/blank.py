@@ -238,3 +238,44 @@ def blank_distance(blank: Blank, x: float, y: float, z: float) -> float:
     for place in range(blank.lists[cell], blank.lists[cell + 1]):
         best = min(best, _to_triangle(blank.corners, blank.lists[place], x, y, z))
     return best if _inside(blank, x, y, z) else -best
+
+
+@compiled
+def half_space(blank: Blank, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+    """An offset [m] and a unit normal so that offset + normal . p is nowhere less than the distance of a point p, and
+    below zero at the point [m], which is outside: a side of the box around the blank, or a plane along a cylinder; the
+    normal is 0 where there is none."""
+    f = blank.frame
+    best, axis, sign = np.inf, 0, 1.0
+    for k, at in enumerate((x, y, z)):
+        below, above = at - f[_LOW + k], f[_HIGH + k] - at
+        if below < best:
+            best, axis, sign = below, k, 1.0
+        if above < best:
+            best, axis, sign = above, k, -1.0
+    if best <= 0.0:
+        side = -f[_LOW + axis] if sign > 0.0 else f[_HIGH + axis]
+        return (
+            side,
+            sign if axis == 0 else 0.0,
+            sign if axis == 1 else 0.0,
+            sign if axis == 2 else 0.0,
+        )
+    if f[_KIND] != CYLINDER:
+        return 0.0, 0.0, 0.0, 0.0
+    u = x - 0.5 * (f[_LOW] + f[_HIGH])
+    v = y - 0.5 * (f[_LOW + 1] + f[_HIGH + 1])
+    w = z - 0.5 * (f[_LOW + 2] + f[_HIGH + 2])
+    lengthwise = int(f[_LENGTHWISE])
+    u, v, w = (
+        (0.0 if lengthwise == 0 else u),
+        (0.0 if lengthwise == 1 else v),
+        (0.0 if lengthwise == 2 else w),
+    )
+    size = np.sqrt(u * u + v * v + w * w)
+    across = 1 if lengthwise == 0 else 0
+    radius = 0.5 * (f[_HIGH + across] - f[_LOW + across])
+    if size <= radius or size == 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    u, v, w = u / size, v / size, w / size
+    return radius + u * (x - size * u) + v * (y - size * v) + w * (z - size * w), -u, -v, -w

@@ -8,6 +8,8 @@ it rises along a, and less half of theta times the distance of the point from th
 
 The distance to a chord is convex, so around a place it is at least linear: of a ball four numbers bound the distance to
 a sweep in all of a cell that lies below its middle.
+
+The same two hold from above, with what is less added: convex functions that are nowhere less than the distance.
 """
 
 from __future__ import annotations
@@ -25,9 +27,11 @@ from postproc.process.stock.distance import (
     MODE,
     RADIUS,
     ROUND,
+    STRAIGHT,
     TAPER,
     axis_at,
     cutter_distance,
+    swept_distance,
     tip_at,
     turn_of,
 )
@@ -127,6 +131,32 @@ def is_far(bounds: Floats, cutters: Floats, j: int, x: float, y: float, z: float
     across = np.sqrt(ux * ux + uy * uy + uz * uz)
     d = cutter_distance(cutters, int(bounds[j, _CUTTER]), across, height)
     return bool(d - bounds[j, _OFF] - away * bounds[j, _HALF_TURN] > enough)
+
+
+@compiled
+def convex_distance(
+    sweeps: Floats, cutters: Floats, bounds: Floats, j: int, x: float, y: float, z: float
+) -> float:
+    """A value that is nowhere less than a convex function of the point [m], which is nowhere less than the distance to
+    sweep ``j``; inf where none is known.  sweeps (M, 22), cutters (T, 6), bounds (M, BOUND_COLUMNS)."""
+    mode = sweeps[j, MODE]
+    if mode in (ACROSS, STRAIGHT):
+        return swept_distance(sweeps, cutters, j, x, y, z, 0.0)
+    if len(bounds) == 0 or bounds[j, _KIND] == 0.0:
+        return np.inf
+    wx, wy, wz = x - bounds[j, _START], y - bounds[j, _START + 1], z - bounds[j, _START + 2]
+    dx, dy, dz = bounds[j, _CHORD], bounds[j, _CHORD + 1], bounds[j, _CHORD + 2]
+    t = min(max((wx * dx + wy * dy + wz * dz) * bounds[j, _INVERSE], 0.0), 1.0)
+    c = int(bounds[j, _CUTTER])
+    if bounds[j, _KIND] == 1.0:
+        ux, uy, uz = wx - t * dx, wy - t * dy, wz - t * dz
+        return float(np.sqrt(ux * ux + uy * uy + uz * uz) - cutters[c, RADIUS] + bounds[j, _OFF])
+    ax, ay, az = bounds[j, _ALONG], bounds[j, _ALONG + 1], bounds[j, _ALONG + 2]
+    away = np.sqrt(wx * wx + wy * wy + wz * wz) + bounds[j, _RISE]
+    height = wx * ax + wy * ay + wz * az
+    ux, uy, uz = wx - height * ax - t * dx, wy - height * ay - t * dy, wz - height * az - t * dz
+    d = cutter_distance(cutters, c, np.sqrt(ux * ux + uy * uy + uz * uz), height)
+    return float(d + bounds[j, _OFF] + away * bounds[j, _HALF_TURN])
 
 
 @compiled

@@ -15,6 +15,7 @@ from postproc.process.stock.blank import Blank, blank_distance, corners_of, lent
 from postproc.process.stock.borrowed import borrowed
 from postproc.process.stock.bounds import (
     BOUND_COLUMNS,
+    NO_PLANE,
     PLANE_COLUMNS,
     Singles,
     is_far,
@@ -25,24 +26,21 @@ from postproc.process.stock.bounds import (
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.distance import (
     ACROSS,
-    ANGLE,
     AXIS,
     CUTTER,
-    LENGTH,
     MODE,
     RADIUS,
     REMOVES,
     STEP,
     TIP_POINT,
-    arc_of,
     axis_at,
     cutter_distance,
     line_distance,
     swept_distance,
     tip_at,
-    turn_of,
 )
 from postproc.process.stock.memory_need import check_memory
+from postproc.process.stock.sweep_boxes import sweep_box
 
 CELL = 0.125  # radii of the smallest cutter
 MOST_CELLS = 4_000_000
@@ -167,28 +165,6 @@ def _mark_outside(stock: Stock, covered: Ints) -> None:
                 # of a mesh distances are known up to its reach only
                 if blank_distance(blank, x, y, z) < -half:
                     covered[(i * shape[1] + j) * shape[2] + k] = -1
-
-
-@compiled
-def sweep_box(sweeps: Floats, cutters: Floats, j: int, box: Floats) -> None:
-    """The corners [m] of a box around sweep ``j`` put into ``box`` (2, 3).  sweeps (M, 22), cutters (T, 6)."""
-    c = int(sweeps[j, CUTTER])
-    radius, length = cutters[c, RADIUS], cutters[c, LENGTH]
-    box[0, :], box[1, :] = np.inf, -np.inf
-    turn = turn_of(sweeps, j)
-    parts = 1 if turn == 0.0 and sweeps[j, ANGLE] == 0.0 else 8
-    for step in range(parts + 1):
-        tip, axis = tip_at(sweeps, j, step / parts), axis_at(sweeps, j, step / parts)
-        for k in range(3):
-            disc = radius * np.sqrt(max(1.0 - axis[k] ** 2, 0.0))
-            box[0, k] = min(box[0, k], tip[k] + min(length * axis[k], 0.0) - disc)
-            box[1, k] = max(box[1, k], tip[k] + max(length * axis[k], 0.0) + disc)
-    if parts > 1:  # what an arc rises above its chords
-        bulge = length * (1.0 - np.cos(0.5 * turn / parts))
-        if sweeps[j, ANGLE] != 0.0:
-            bulge += arc_of(sweeps, j)[0] * (1.0 - np.cos(0.5 * sweeps[j, ANGLE] / parts))
-        box[0, :] -= bulge
-        box[1, :] += bulge
 
 
 @compiled
@@ -362,7 +338,7 @@ def _place_of(ends: Floats, count: int, along: float) -> int:
 @compiled
 def stock_distance(stock: Stock, x: float, y: float, z: float, time: int) -> float:
     """Of a point [m] to what is left of the blank before the sweep ``time``, positive inside, up to ``reach``."""
-    return _nearest(stock, x, y, z, time, 0.0)[0]
+    return nearest_line(stock, x, y, z, time, 0.0)[0]
 
 
 @compiled
@@ -371,7 +347,7 @@ def nearest_sweep(stock: Stock, x: float, y: float, z: float, time: int, depth: 
 
     Below zero it is no more than a bound, but down to ``depth`` [m] how far the point is in the sweep it is most in.
     """
-    d, low, high = _nearest(stock, x, y, z, time, depth)
+    d, low, high = nearest_line(stock, x, y, z, time, depth)
     sweeps = stock.sweeps
     while low < high:  # of a line the sweep beside the point
         middle = (low + high + 1) // 2
@@ -386,7 +362,9 @@ def nearest_sweep(stock: Stock, x: float, y: float, z: float, time: int, depth: 
 
 
 @compiled
-def _nearest(stock: Stock, x: float, y: float, z: float, time: int, depth: float) -> tuple[float, int, int]:
+def nearest_line(
+    stock: Stock, x: float, y: float, z: float, time: int, depth: float
+) -> tuple[float, int, int]:
     """As ``nearest_sweep``, with the first and the last sweep of the line that is that near."""
     grid = stock.grid
     size, reach = grid[0], grid[1]
@@ -412,12 +390,22 @@ def _nearest(stock: Stock, x: float, y: float, z: float, time: int, depth: float
             low = middle + 1
         else:
             high = middle
+    likely = _likely(planes, start, low, dx, dy, dz) if bounded else -1
+    if likely >= 0:  # most others are farther than the likely one, whose distance is asked first
+        last = int(stock.near[likely])
+        d = swept_distance(stock.sweeps, stock.cutters, last, x, y, z, max(best, depth))
+        if d < best:
+            best, owner, end = d, last, last
+            if best <= -reach:
+                return -reach, owner, end
     place = low - 1
     while place >= start:
         # on the positive side only a smaller distance counts
         enough = max(best, depth)
-        if bounded and (
-            planes[place, 0] + planes[place, 1] * dx + planes[place, 2] * dy + planes[place, 3] * dz > enough
+        if place == likely or (
+            bounded
+            and planes[place, 0] + planes[place, 1] * dx + planes[place, 2] * dy + planes[place, 3] * dz
+            > enough
         ):
             place -= 1
             continue
@@ -434,3 +422,18 @@ def _nearest(stock: Stock, x: float, y: float, z: float, time: int, depth: float
             if best <= -reach:
                 return -reach, owner, end
     return best, owner, end
+
+
+@compiled
+def _likely(planes: Singles, start: int, end: int, dx: float, dy: float, dz: float) -> int:
+    """Of the entries from ``start`` to before ``end`` that whose plane is lowest at (dx, dy, dz) [m] from the middle of
+    the cell, the last of equal ones; -1 where none has a plane."""
+    found, least = -1, np.inf
+    for place in range(end - 1, start - 1, -1):
+        at = planes[place, 0]
+        if at == NO_PLANE:
+            continue
+        at += planes[place, 1] * dx + planes[place, 2] * dy + planes[place, 3] * dz
+        if at < least:
+            found, least = place, at
+    return found

@@ -24,8 +24,9 @@ import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 from postproc.process.stock.borrowed import borrowed, keep_alive
-from postproc.process.stock.cells import Stock, lent_stock, stock_distance
+from postproc.process.stock.cells import Stock, lent_stock, nearest_line
 from postproc.process.stock.compiled import compiled
+from postproc.process.stock.cutter_circles import chip_of, circle_at, on_circle
 from postproc.process.stock.distance import (
     ANGLE,
     CENTRE,
@@ -37,6 +38,7 @@ from postproc.process.stock.distance import (
     height_range,
     tip_at,
 )
+from postproc.process.stock.empty_patches import arc_bound, touches_none
 
 RATE, FORCE, MOMENT, LOW, HIGH, ENTRY, EXIT, RIGHT, LEFT, CHIP = 0, 1, 4, 7, 8, 9, 10, 11, 12, 13
 """Columns of a contact: removed area across the feed [m2]; force [N] and moment at the tip [N m] in the feed
@@ -48,6 +50,7 @@ NEAR_ZERO = 2e-7
 
 _LEAST_STOCK = 1e-8  # m: thinner is a digit of a number
 _LEAST_ARC = 0.02 * np.pi / 180
+_SMALL_TURN = 30.0 * np.pi / 180
 _SMALL_ARC, _SMALLER_ARC, _STRAIGHT_ENOUGH = 12.0 * np.pi / 180, 1.0 * np.pi / 180, 0.02
 _GRAZING = 0.01
 _LEAST_SHARE = 2e-4  # of the radius: the shortest length of profile
@@ -138,16 +141,13 @@ def set_pose(sweeps: Floats, j: int, t: float, heading: Floats, pose: Floats) ->
 
 
 @compiled
-def _outside(stock: Stock, pose: Floats, r: float, height: float, phi: float, time: int) -> float:
-    """Distance to the stock at the angle ``phi`` of the circle with the radius ``r`` at ``height`` [m]."""
-    s, c = r * np.sin(phi), r * np.cos(phi)
-    return stock_distance(
-        stock,
-        pose[0, 0] + s * pose[1, 0] + c * pose[2, 0] + height * pose[3, 0],
-        pose[0, 1] + s * pose[1, 1] + c * pose[2, 1] + height * pose[3, 1],
-        pose[0, 2] + s * pose[1, 2] + c * pose[2, 2] + height * pose[3, 2],
-        time,
-    )
+def _outside(
+    stock: Stock, pose: Floats, r: float, height: float, phi: float, time: int
+) -> tuple[float, int, int]:
+    """Distance to the stock at the angle ``phi`` of the circle with the radius ``r`` at ``height`` [m], and the sweeps
+    that are nearest."""
+    x, y, z = on_circle(pose, r, height, phi)
+    return nearest_line(stock, x, y, z, time, 0.0)
 
 
 @compiled
@@ -196,19 +196,23 @@ def find_arcs(stock: Stock, pose: Floats, circle: CutterCircle, time: int, arc: 
     arc[_GREATEST], arc[BOUND], arc[_FIRST], arc[_LAST] = -np.inf, -np.inf, np.inf, -np.inf
     arc[_MOST_LEFT], arc[_MOST_RIGHT] = -np.inf, np.inf
     parts = int(max(4.0, np.ceil((high - low) / (2.0 * _SMALL_ARC))))
-    ends, values = np.empty(64), np.empty(64)
+    ends, values, lines = np.empty(64), np.empty(64), np.empty((64, 2), np.int64)
     a = low
-    ga = _outside(stock, pose, r, height, a, time) - margin
+    ga, first, last = _outside(stock, pose, r, height, a, time)
+    ga -= margin
     arc[_GREATEST] = ga
     for part in range(parts):
         top = 0
         ends[0] = low + (high - low) * (part + 1) / parts
-        values[0] = _outside(stock, pose, r, height, ends[0], time) - margin
+        values[0], lines[0, 0], lines[0, 1] = _outside(stock, pose, r, height, ends[0], time)
+        values[0] -= margin
         while top >= 0:
             b, gb = ends[top], values[top]
             arc[_GREATEST] = max(arc[_GREATEST], gb)
             wide = r * (b - a)
             above = 0.5 * (ga + gb + wide)
+            if above > 0.0 and ga <= 0.0 and gb <= 0.0 and b - a < _SMALL_TURN:
+                above = min(above, arc_bound(stock, pose, r, height, a, b, (first, last)) - margin)
             if above <= 0.0:
                 arc[BOUND] = max(arc[BOUND], above)
             elif ga + gb >= wide:
@@ -218,7 +222,8 @@ def find_arcs(stock: Stock, pose: Floats, circle: CutterCircle, time: int, arc: 
                 _add_above_zero(arc, a, ga, b, gb, r)
             else:
                 middle = 0.5 * (a + b)
-                g = _outside(stock, pose, r, height, middle, time) - margin
+                g, owner, end = _outside(stock, pose, r, height, middle, time)
+                g -= margin
                 bend = abs(ga - 2.0 * g + gb)
                 if abs(g) < NEAR_ZERO and abs(ga) < NEAR_ZERO and abs(gb) < NEAR_ZERO and b - a < 0.3:
                     arc[BOUND] = max(arc[BOUND], NEAR_ZERO)
@@ -234,9 +239,9 @@ def find_arcs(stock: Stock, pose: Floats, circle: CutterCircle, time: int, arc: 
                     _add_above_zero(arc, middle, g, b, gb, r)
                 else:
                     top += 1
-                    ends[top], values[top] = middle, g
+                    ends[top], values[top], lines[top, 0], lines[top, 1] = middle, g, owner, end
                     continue
-            a, ga = b, gb
+            a, ga, first, last = b, gb, lines[top, 0], lines[top, 1]
             top -= 1
 
 
@@ -267,25 +272,13 @@ def _set_node_by(
     arc: Floats,
 ) -> None:
     """``_set_node``; arc (12,): of ``find_arcs``."""
-    element, law = cutter.profile[e], cutter.law
-    if element[1] == 0.0:
-        share = s / element[7]
-        r = element[2] + share * (element[4] - element[2])
-        height = element[3] + share * (element[5] - element[3])
-        sine, cosine = (element[5] - element[3]) / element[7], (element[4] - element[2]) / element[7]
-    else:
-        sine, cosine = np.sin(s / element[4]), np.cos(s / element[4])
-        r, height = element[2] + element[4] * sine, element[3] - element[4] * cosine
+    law = cutter.law
+    r, height, sine, cosine = circle_at(cutter.profile[e], s)
     node[:] = 0.0
     node[_AT] = s
-    v, w = pose[4], pose[5]
-    lever = r * cosine + height * sine
-    a, b, c = v[0] * sine + w[1] * lever, v[1] * sine - w[0] * lever, -v[2] * cosine
-    size = np.sqrt(a * a + b * b)
-    if c <= -size + 1e-12:
+    a, b, c, middle, half = chip_of(pose, r, height, sine, cosine)
+    if half < 0.0:
         return
-    middle = np.arctan2(a, b)
-    half = np.pi if c >= size else np.arccos(-c / size)
     circle = CutterCircle(r, height, middle - half, middle + half, _LEAST_STOCK, _LEAST_ARC)
     find_arcs(stock, pose, circle, cutter.time, arc)
     node[_SEEN], node[_MOST] = arc[_GREATEST], arc[BOUND]
@@ -334,7 +327,7 @@ def _set_node_by(
         a * np.sin(arc[_FIRST]) + b * np.cos(arc[_FIRST]), a * np.sin(arc[_LAST]) + b * np.cos(arc[_LAST])
     )
     if arc[_FIRST] <= middle <= arc[_LAST]:
-        thickest = size
+        thickest = np.sqrt(a * a + b * b)
     contact[CHIP] = max(contact[CHIP], chip * (thickest + c))
 
 
@@ -377,7 +370,12 @@ def find_contact(stock: Stock, cutter: SweepCutter, pose: Floats, contact: Float
                 right = nodes[top]
                 wide = right[_AT] - left[_AT]
                 empty = left[_TOUCHES] == 0.0 and right[_TOUCHES] == 0.0
-                done = empty and left[_MOST] + right[_MOST] + wide <= 0.0
+                done = empty and (
+                    left[_MOST] + right[_MOST] + wide <= 0.0
+                    or touches_none(
+                        stock, pose, element, left[_AT], right[_AT], _LEAST_STOCK, gap, cutter.time
+                    )
+                )
                 if not done and wide < least:
                     for k in range(8):
                         total[k] += 0.5 * wide * (left[_SUM + k] + right[_SUM + k])
