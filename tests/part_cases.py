@@ -9,7 +9,7 @@ from stock_cases import MM
 from postproc.part.deflected_sweeps import deflect
 from postproc.part.surface import find_surface
 from postproc.part.surface_error import find_errors
-from postproc.process.stock.cells import build_stock
+from postproc.process.stock.cell_lists import build_stock
 
 LEVER = 40 * MM
 

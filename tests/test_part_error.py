@@ -205,7 +205,8 @@ def test_no_list_leaves_out_a_motion_that_counts(cutter, slack):
     """Distances by the lists of the cells are those to every motion, at any time of a zigzag of short motions."""
     from part_cases import sweeps_of
 
-    from postproc.process.stock.cells import build_stock, stock_distance
+    from postproc.process.stock.cell_lists import build_stock
+    from postproc.process.stock.cells import stock_distance
     from postproc.process.stock.distance import swept_distance
 
     u = np.linspace(-40, 40, 41)

@@ -15,7 +15,8 @@ from postproc.process.stock.bounds import (
     set_bound,
     set_plane,
 )
-from postproc.process.stock.cells import build_stock, stock_distance
+from postproc.process.stock.cell_lists import build_stock
+from postproc.process.stock.cells import stock_distance
 from postproc.process.stock.distance import pose_distance
 
 

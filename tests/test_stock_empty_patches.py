@@ -10,8 +10,9 @@ from test_stock_bounds import random_path
 
 from postproc.process.stock.blank import blank_distance, box_blank, cylinder_blank, half_space, mesh_blank
 from postproc.process.stock.bounds import BOUND_COLUMNS, convex_distance, set_bound
-from postproc.process.stock.cells import build_stock, nearest_line, stock_distance
-from postproc.process.stock.contact import set_pose
+from postproc.process.stock.cell_lists import build_stock
+from postproc.process.stock.cells import nearest_line, stock_distance
+from postproc.process.stock.contact import CutterCircle, find_arcs, set_pose
 from postproc.process.stock.cutter_circles import chip_of, circle_at, on_circle
 from postproc.process.stock.distance import pose_distance
 from postproc.process.stock.empty_patches import arc_bound, touches_none
@@ -132,6 +133,7 @@ def arc_holds(stock, pose, r, height, first, time):
     _, owner, end = nearest_line(stock, *on_circle(pose, r, height, first), time, 0.0)
     most = arc_bound(stock, pose, r, height, first, last, (owner, end))
     if most > 0.0:
+        assert np.isinf(most)
         return False
     for phi in np.linspace(first, last, 4):
         place = on_circle(pose, r, height, phi)
@@ -143,6 +145,18 @@ def arc_holds(stock, pose, r, height, first, time):
             )
         assert d <= most + 30e-6
     return True
+
+
+def test_a_layer_of_a_micrometre_between_places_without_stock_is_seen():
+    """A cutter leaves the side of a block: 10 um on, what is left between its last place and the side is 1 um thick."""
+    blank = block([0, 0, -60], [200, 100, 0])
+    points = np.column_stack([np.arange(150, 202.0), np.full(52, -4.0), np.full(52, -2.0)])
+    rows = rows_of(points, None, FLAT, blank)
+    stock, _ = build_stock(blank, rows, np.array([FLAT.numbers]))
+    last, pose, arc = int(np.argmin(abs(rows[:, 0] - 0.199))), np.zeros((6, 3)), np.zeros(12)
+    set_pose(rows, last, 0.01, UPRIGHT, pose)
+    find_arcs(stock, pose, CutterCircle(8e-3, 1e-3, 0.0, np.pi, MARGIN, 3e-4), last, arc)
+    assert arc[0] == pytest.approx(np.arcsin(0.99 / 8), rel=0.02)
 
 
 @pytest.mark.parametrize("depth", [0.01, -0.01])

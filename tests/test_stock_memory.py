@@ -16,7 +16,7 @@ from test_engage_command import STOCK, TOOLS, folder, refused, state
 from postproc.base.memory import free_memory
 from postproc.cli.main import main
 from postproc.process.stock import memory_need
-from postproc.process.stock.cells import build_stock
+from postproc.process.stock.cell_lists import build_stock
 
 __all__ = ["folder"]
 

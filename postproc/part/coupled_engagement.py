@@ -21,7 +21,7 @@ from postproc.compensation.mirror import pose_error
 from postproc.compensation.subdivision import Subdivision
 from postproc.part.deflected_sweeps import axes_of, tips_of
 from postproc.part.displacement import Displacements
-from postproc.process.stock.cells import build_stock
+from postproc.process.stock.cell_lists import build_stock
 from postproc.process.stock.coupled import AS_STRAIGHT, UNSETTLED, solve_pieces
 from postproc.process.stock.coupled_pieces import Nodes, Pieces
 from postproc.process.stock.displaced import displaced_rows

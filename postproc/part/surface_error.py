@@ -16,7 +16,8 @@ from postproc.base.arrays import Floats, Ints
 from postproc.base.batches import each_block
 from postproc.part.surface import outward
 from postproc.process.stock.borrowed import borrowed
-from postproc.process.stock.cells import Stock, build_stock, lent_stock, nearest_sweep
+from postproc.process.stock.cell_lists import build_stock
+from postproc.process.stock.cells import Stock, lent_stock, nearest_sweep
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.distance import pose_distance
 

@@ -32,7 +32,7 @@ from stock_cases import BALL, FLAT, block, path_through, run
 from postproc.part.deflected_sweeps import deflect
 from postproc.part.surface import find_surface
 from postproc.part.surface_error import find_errors
-from postproc.process.stock.cells import build_stock
+from postproc.process.stock.cell_lists import build_stock
 from postproc.process.stock.contact import COLUMNS, SweepCutters, contacts
 from postproc.process.stock.engagement import laws_of, profiles_of
 

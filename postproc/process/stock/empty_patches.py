@@ -110,7 +110,7 @@ def arc_bound(
     stock: Stock, pose: Floats, r: float, height: float, first: float, last: float, line: tuple[int, int]
 ) -> float:
     """[m] What the distance to the stock does not exceed on the arc from ``first`` to ``last`` [rad], less than half a
-    turn, of the circle with the radius ``r`` at ``height`` [m]; above zero it may be any.
+    turn, of the circle with the radius ``r`` at ``height`` [m]; inf where it may be above zero.
 
     line: the sweeps that are nearest at ``first``, of ``nearest_line``; pose (6, 3): of ``set_pose``.
     """
@@ -119,10 +119,10 @@ def arc_bound(
     most = _outside_of(stock, piece, x, y, z)
     for k in range(1, 3):
         if most > 0.0:
-            break
+            return np.inf
         x, y, z = _hull_point(pose, r, height, first, last, k)
         most = max(most, _outside_of(stock, piece, x, y, z))
-    return most
+    return most if most <= 0.0 else np.inf
 
 
 @compiled

@@ -13,7 +13,8 @@ from postproc.base.batches import each_block
 from postproc.base.units import MM
 from postproc.process.force_profiles import ForceProfiles
 from postproc.process.stock.blank import Blank
-from postproc.process.stock.cells import Stock, build_stock
+from postproc.process.stock.cell_lists import build_stock
+from postproc.process.stock.cells import Stock
 from postproc.process.stock.chains import chain_contacts
 from postproc.process.stock.collision import collisions
 from postproc.process.stock.contact import (
