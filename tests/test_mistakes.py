@@ -234,3 +234,10 @@ def test_a_batch_without_force_writes_nothing(compensate, job, monkeypatch):
 def test_upper_case_suffixes_are_read(compensate, job):
     program = job.program.rename(job.folder / "PART.SRC")
     assert compensate(program, f"--force={FORCE}", "--dry-run").code == 0
+
+
+def test_an_option_that_resembles_none_is_not_compared_by_its_dashes(compensate, job):
+    done = compensate("check", job.folder / P, "--robot")
+    assert done.code == 2
+    assert "There is no option '--robot'." in done.err
+    assert "Did you mean" not in done.err

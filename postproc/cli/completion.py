@@ -8,6 +8,7 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem, get_completion_class
 
+from postproc.base.findings import resembles
 from postproc.workflows.option_names import FORMER_OPTIONS
 
 SHELLS = ("bash", "zsh", "fish")
@@ -35,7 +36,9 @@ class Commands(click.Group):
             return super().invoke(ctx)
         except click.NoSuchOption as error:
             # former names are taken, but nobody is sent to them
-            names = [_present_option(name) for name in error.possibilities or ()]
+            given = error.option_name.lstrip("-")
+            close = [name for name in error.possibilities or () if resembles(name.lstrip("-"), given)]
+            names = [_present_option(name) for name in close]
             shown = " or ".join(dict.fromkeys(names))
             hint = f" Did you mean {shown}?" if shown else ""
             raise click.UsageError(f"There is no option {error.option_name!r}.{hint}", error.ctx) from None
