@@ -138,7 +138,7 @@ def convex_distance(
     sweeps: Floats, cutters: Floats, bounds: Floats, j: int, x: float, y: float, z: float
 ) -> float:
     """A value that is nowhere less than a convex function of the point [m], which is nowhere less than the distance to
-    sweep ``j``; inf where none is known.  sweeps (M, 22), cutters (T, 6), bounds (M, BOUND_COLUMNS)."""
+    sweep ``j``; inf where none is known.  sweeps (M, 22), cutters (T, 6), bounds (M, 15)."""
     mode = sweeps[j, MODE]
     if mode in (ACROSS, STRAIGHT):
         return swept_distance(sweeps, cutters, j, x, y, z, 0.0)
