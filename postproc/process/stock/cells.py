@@ -26,6 +26,9 @@ from postproc.process.stock.distance import (
     swept_distance,
 )
 
+_DEEP = 0.125
+"""Of the reach: a point that one sweep holds so deep needs no deeper one; lines through shallower points cross zero."""
+
 
 class Stock(NamedTuple):
     """A blank with all that is removed from it.
@@ -126,8 +129,8 @@ def nearest_line(
         d = swept_distance(stock.sweeps, stock.cutters, last, x, y, z, max(best, depth))
         if d < best:
             best, owner, end = d, last, last
-            if best <= -reach:
-                return -reach, owner, end
+            if best <= -reach or (depth == 0.0 and best < -_DEEP * reach):
+                return max(best, -reach), owner, end
     place = low - 1
     while place >= start:
         # on the positive side only a smaller distance counts
