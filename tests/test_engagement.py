@@ -171,24 +171,28 @@ def test_a_plunge_is_the_thrust_of_its_end_edges():
     assert cut.exit[1] - cut.entry[1] == pytest.approx(2 * np.pi, abs=1e-6)
 
 
-def integrated(cutter, depth, chip=CHIP, slices=4000, angles=4000, beside=None):
-    """The mean force and the area across the feed of a slot, by plain quadrature over height and angle.
+def integrated(cutter, depth, chip=CHIP, slices=2000, angles=4000, beside=None):
+    """The mean force and the area across the feed of a slot, by plain quadrature over the profile's length and angle:
+    by height it would be coarse near the tip of a ball, where edges lie across the axis.
 
     beside [m]: what a row so far to the right left is cut."""
-    z = (np.arange(slices) + 0.5) / slices * depth
+    part = (np.arange(slices) + 0.5) / slices
     if cutter.taper is not None:
-        r = np.minimum(cutter.tip + z * np.tan(cutter.taper), cutter.radius)
-        on_cone = cutter.tip + z * np.tan(cutter.taper) < cutter.radius
-        k = np.where(on_cone, np.pi / 2 - cutter.taper, np.pi / 2)
+        top = min(depth, (cutter.radius - cutter.tip) / np.tan(cutter.taper))
+        r = np.concatenate([cutter.tip + part * top * np.tan(cutter.taper), np.full(slices, cutter.radius)])
+        k = np.repeat([np.pi / 2 - cutter.taper, np.pi / 2], slices)
+        length = np.repeat([top / np.cos(cutter.taper), depth - top], slices) / slices
     else:
-        low = z < cutter.corner
-        k = np.where(low, np.arccos(np.clip(1 - z / max(cutter.corner, 1e-12), -1, 1)), np.pi / 2)
+        top = min(depth, cutter.corner)
+        last = np.arccos(1 - top / max(cutter.corner, 1e-12))
+        k = np.concatenate([part * last, np.full(slices, np.pi / 2)])
         r = cutter.radius - cutter.corner + cutter.corner * np.sin(k)
+        length = np.repeat([cutter.corner * last, depth - top], slices) / slices
     phi = (np.arange(angles) + 0.5) / angles * np.pi
     s, c = np.sin(phi), np.cos(phi)
     sk, ck, r = (v[:, None] for v in (np.sin(k), np.cos(k), r))
     thick = sk * s
-    area = depth / slices / sk * np.pi / angles
+    area = length[:, None] * np.full(angles, np.pi / angles)
     if beside is not None:
         area = np.where(r * c > r - beside, area, 0.0)
     weight = area * cutter.teeth / (2 * np.pi)

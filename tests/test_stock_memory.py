@@ -81,6 +81,6 @@ def test_the_estimate_is_that_of_a_run(five):
     tracemalloc.stop()
     stock, _ = build_stock(blank, sweeps.rows, np.array([one.numbers for one in sweeps.cutters]))
     need = len(sweeps.rows) * memory_need.OF_A_SWEEP + len(stock.near) * memory_need.OF_AN_ENTRY
-    need += (len(stock.first) - 1) * memory_need.OF_A_CELL + len(stock.planes) * memory_need.OF_A_PLANE
+    need += (len(stock.first) - 1) * memory_need.OF_A_CELL + stock.planes.shape[1] * memory_need.OF_A_PLANE
     print(f"{count} motions: estimate {need / 1e6:.1f} MB, peak {peak / 1e6:.1f} MB")
     assert peak < need < 2 * peak

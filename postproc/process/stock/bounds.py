@@ -50,7 +50,7 @@ PLANE_COLUMNS = 4
 NO_PLANE = -1.0  # m: a bound that nothing exceeds
 
 _DIGITS = 1e-12  # m
-_SINGLE = 1e-9  # m: more than the digits of a plane
+_SINGLE = 1e-9  # m: more than the digits of a plane, and of a sum of them
 _BULGE = 0.126  # of R theta^2: an arc above its chord, 1/8 and what follows up to half a rad
 _LARGEST_TURN = 0.5
 

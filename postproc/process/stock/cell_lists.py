@@ -66,7 +66,7 @@ def build_stock(
         size *= 1.2
     shape = np.maximum(np.ceil(span / size).astype(np.int64), 1)
     cells = int(np.prod(shape))
-    none, plain = np.zeros(1, np.int32), np.zeros((0, PLANE_COLUMNS), np.float32)
+    none, plain = np.zeros(1, np.int32), np.zeros((PLANE_COLUMNS, 0), np.float32)
     grid = np.array([size, max(0.5 * size, reach), *shape], float)
     bounds = np.zeros((len(sweeps) if may_be_bounded(sweeps) else 0, BOUND_COLUMNS))
     _set_bounds(sweeps, cutters, bounds)
@@ -89,7 +89,7 @@ def build_stock(
     bounded = entries if len(bounds) and slack == 0.0 else 0
     check_memory(len(sweeps), cells, entries, bounded)
     near, stop = (np.zeros(entries, np.int32) for _ in range(2))
-    planes = np.zeros((bounded, PLANE_COLUMNS), np.float32)
+    planes = np.zeros((PLANE_COLUMNS, bounded), np.float32)
     list_all((first[:-1].copy(), near, stop, planes))
     ends = np.column_stack([live[:, :, 0].min(axis=0), live[:, :, 1].max(axis=0)])
     return stock._replace(first=first, near=near, stop=stop, planes=planes), ends
@@ -301,8 +301,8 @@ def _list(
                                 break
                             near[count[cell]] = m
                             stop[count[cell]] = near_last if slack == 0.0 else m
-                            if len(planes):
-                                set_plane(stock.bounds, cutters, m, x, y, z, half, planes[count[cell]])
+                            if planes.shape[1]:
+                                set_plane(stock.bounds, cutters, m, x, y, z, half, planes[:, count[cell]])
                             count[cell] += 1
                         continue
                     for m in range(near_first, near_last + 1):

@@ -14,7 +14,6 @@ from postproc.base.arrays import Floats, Ints
 from postproc.process.stock.blank import Blank, blank_distance, lent_blank
 from postproc.process.stock.borrowed import borrowed
 from postproc.process.stock.bounds import (
-    NO_PLANE,
     Singles,
     is_far,
 )
@@ -37,7 +36,7 @@ class Stock(NamedTuple):
     distances are known [m], and the numbers of cells from the blank's lowest corner; first (C + 1,) and near
     (E,): the sweeps that come that near to each cell, ascending; stop (E,): the last of the sweeps from that of
     ``near`` on that go on in one line and are near.  bounds (M, B): of the sweeps, B columns, or of
-    none; whoever changes a sweep sets its bound again.  planes (E, 4): of the entries of ``near``, or of none where
+    none; whoever changes a sweep sets its bound again.  planes (4, E): of the entries of ``near``, or of none where
     sweeps may be displaced.
     """
 
@@ -113,43 +112,43 @@ def nearest_line(
     cell = (i * int(grid[3]) + j) * int(grid[4]) + k
     low, high = stock.first[cell], stock.first[cell + 1]
     start = low
-    planes, bounded = stock.planes, len(stock.planes) > 0
-    dx = x - frame[1] - (i + 0.5) * size
-    dy = y - frame[2] - (j + 0.5) * size
-    dz = z - frame[3] - (k + 0.5) * size
     while low < high:  # the first that is not before ``time``
         middle = (low + high) // 2
         if stock.near[middle] < time:
             low = middle + 1
         else:
             high = middle
-    likely = _likely(planes, start, low, dx, dy, dz) if bounded else -1
+    near, stop, planes = stock.near[start:low], stock.stop[start:low], stock.planes
+    bounded = planes.shape[1] > 0
+    # views and single precision, which processors run faster along
+    least, ux = planes[0, start:low], planes[1, start:low]
+    uy, uz = planes[2, start:low], planes[3, start:low]
+    dx = np.float32(x - frame[1] - (i + 0.5) * size)
+    dy = np.float32(y - frame[2] - (j + 0.5) * size)
+    dz = np.float32(z - frame[3] - (k + 0.5) * size)
+    likely, lowest = -1, np.float32(np.inf)
+    for entry in range(len(least)):
+        at = least[entry] + ux[entry] * dx + uy[entry] * dy + uz[entry] * dz
+        if at <= lowest:
+            likely, lowest = entry, at
     if likely >= 0:  # most others are farther than the likely one, whose distance is asked first
-        last = int(stock.near[likely])
-        d = swept_distance(stock.sweeps, stock.cutters, last, x, y, z, max(best, depth))
+        first, last = int(near[likely]), min(int(stop[likely]), time - 1)
+        d = _distance(stock, first, last, x, y, z, max(best, depth))
         if d < best:
-            best, owner, end = d, last, last
+            best, owner, end = d, first, last
             if best <= -reach or (depth == 0.0 and best < -_DEEP * reach):
                 return max(best, -reach), owner, end
-    place = low - 1
-    while place >= start:
+    for entry in range(len(near) - 1, -1, -1):
         # on the positive side only a smaller distance counts
         enough = max(best, depth)
-        if place == likely or (
-            bounded
-            and planes[place, 0] + planes[place, 1] * dx + planes[place, 2] * dy + planes[place, 3] * dz
-            > enough
+        if entry == likely or (
+            bounded and least[entry] + ux[entry] * dx + uy[entry] * dy + uz[entry] * dz > enough
         ):
-            place -= 1
             continue
-        first, last = int(stock.near[place]), min(int(stock.stop[place]), time - 1)
-        place -= 1
-        if first != last:
-            d = line_distance(stock.sweeps, stock.cutters, first, last, x, y, z, enough)
-        elif is_far(stock.bounds, stock.cutters, last, x, y, z, enough):
+        first, last = int(near[entry]), min(int(stop[entry]), time - 1)
+        if first == last and is_far(stock.bounds, stock.cutters, last, x, y, z, enough):
             continue
-        else:
-            d = swept_distance(stock.sweeps, stock.cutters, last, x, y, z, enough)
+        d = _distance(stock, first, last, x, y, z, enough)
         if d < best:
             best, owner, end = d, first, last
             if best <= -reach:
@@ -158,15 +157,8 @@ def nearest_line(
 
 
 @compiled
-def _likely(planes: Singles, start: int, end: int, dx: float, dy: float, dz: float) -> int:
-    """Of the entries from ``start`` to before ``end`` that whose plane is lowest at (dx, dy, dz) [m] from the middle of
-    the cell, the last of equal ones; -1 where none has a plane."""
-    found, least = -1, np.inf
-    for place in range(end - 1, start - 1, -1):
-        at = planes[place, 0]
-        if at == NO_PLANE:
-            continue
-        at += planes[place, 1] * dx + planes[place, 2] * dy + planes[place, 3] * dz
-        if at < least:
-            found, least = place, at
-    return found
+def _distance(stock: Stock, first: int, last: int, x: float, y: float, z: float, enough: float) -> float:
+    """``swept_distance`` of a line of sweeps."""
+    if first != last:
+        return line_distance(stock.sweeps, stock.cutters, first, last, x, y, z, enough)
+    return swept_distance(stock.sweeps, stock.cutters, last, x, y, z, enough)

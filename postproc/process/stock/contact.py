@@ -57,6 +57,7 @@ _LEAST_SHARE = 2e-4  # of the radius: the shortest length of profile
 _LEAST_GAP = (
     4e-3  # of the radius: between two circles without stock so near none is in between that a force shows
 )
+_BESIDE_TIP = 1e-6  # of the corner radius: where a surface has no slope its edges have no side of the feed
 _EVEN, _EVEN_AT_END = 2e-3, 3e-4  # change of a panel's integrals that ends its halving, as a share of all
 _BENT = 0.2
 _SKEW = 0.5 * np.pi
@@ -349,6 +350,8 @@ def find_contact(stock: Stock, cutter: SweepCutter, pose: Floats, contact: Float
         if flat and pose[4, 2] >= -1e-9 and abs(pose[5, 0]) + abs(pose[5, 1]) < 1e-12:
             continue  # a flat end that does not go down
         first, last = height_range(element, live[0], live[1])
+        if element[1] != 0.0:
+            first = max(first, _BESIDE_TIP * element[4])
         if last <= first:
             continue
         least, gap = _LEAST_SHARE * max(element[4], element[2]), _LEAST_GAP * max(element[4], element[2])
