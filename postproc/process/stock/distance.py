@@ -21,11 +21,8 @@ angle (-1: no taper) and its cosine."""
 
 _GOLDEN = 0.6180339887498949
 _PLACE = 1e-9  # m: of the place on a line where it is nearest
-_SHORT, _FEET = (
-    1e-6,
-    6,
-)  # m: the place of a foot along the path of a ball, and the steps to it: errors are its square by R
-
+_SHORT, _FEET = 1e-6, 6  # m: of the path of a ball, which has a foot; the steps to it
+Triple = tuple[float, float, float]
 
 TIP_POINT, STEP, AXIS, TURN, CENTRE, NORMAL, ANGLE, MODE, CUTTER, REMOVES = 0, 3, 6, 9, 12, 15, 18, 19, 20, 21
 """Columns of the rows of sweeps (M, ROW), parts of motions in the order in which they run, in the axes of the stock.
@@ -140,10 +137,15 @@ def speed_bound(sweeps: Floats, j: int, reach: float) -> float:
 @compiled
 def pose_distance(sweeps: Floats, cutters: Floats, j: int, t: float, x: float, y: float, z: float) -> float:
     """Of the point to the cutter at the share ``t`` of sweep ``j``; sweeps (M, 22), cutters (T, 6)."""
-    px, py, pz = tip_at(sweeps, j, t)
-    ax, ay, az = axis_at(sweeps, j, t)
-    wx, wy, wz = x - px, y - py, z - pz
-    height = wx * ax + wy * ay + wz * az
+    return _distance_at(sweeps, cutters, j, tip_at(sweeps, j, t), axis_at(sweeps, j, t), x, y, z)
+
+
+@compiled
+def _distance_at(
+    sweeps: Floats, cutters: Floats, j: int, tip: Triple, axis: Triple, x: float, y: float, z: float
+) -> float:
+    wx, wy, wz = x - tip[0], y - tip[1], z - tip[2]
+    height = wx * axis[0] + wy * axis[1] + wz * axis[2]
     across = np.sqrt(max(wx * wx + wy * wy + wz * wz - height * height, 0.0))
     return cutter_distance(cutters, int(sweeps[j, CUTTER]), across, height)
 
@@ -272,31 +274,34 @@ def _round(sweeps: Floats, cutters: Floats, j: int, x: float, y: float, z: float
 
 
 @compiled
-def _below_ball(sweeps: Floats, cutters: Floats, j: int, x: float, y: float, z: float) -> tuple[bool, float]:
+def _below_ball(
+    sweeps: Floats, cutters: Floats, j: int, tip: Triple, axis: Triple, x: float, y: float, z: float
+) -> tuple[bool, float]:
     """Whether the point is nearest to the round end of a ball along sweep ``j``, and its distance [m]: at the foot on
-    the way of the ball's middle, which is almost straight."""
+    the way of the ball's middle, which is almost straight.  ``tip`` and ``axis``: in the middle of the sweep."""
     c = int(sweeps[j, CUTTER])
     corner = cutters[c, CORNER]
     if cutters[c, TAPER] >= 0.0 or cutters[c, RADIUS] > corner:
         return False, 0.0
     wx, wy, wz = sweeps[j, TURN], sweeps[j, TURN + 1], sweeps[j, TURN + 2]
+    bend = 0.5 * corner * (wx * wx + wy * wy + wz * wz)  # from the tangent, of the square of the share
     t = 0.5
     for _ in range(_FEET):
-        tip, axis = tip_at(sweeps, j, t), axis_at(sweeps, j, t)
-        ux, uy, uz = x - tip[0], y - tip[1], z - tip[2]
-        vx, vy, vz = ux - corner * axis[0], uy - corner * axis[1], uz - corner * axis[2]
-        dx = sweeps[j, STEP] + corner * (wy * axis[2] - wz * axis[1])
-        dy = sweeps[j, STEP + 1] + corner * (wz * axis[0] - wx * axis[2])
-        dz = sweeps[j, STEP + 2] + corner * (wx * axis[1] - wy * axis[0])
+        vx, vy, vz = x - tip[0] - corner * axis[0], y - tip[1] - corner * axis[1], z - tip[2] - corner * axis[2]
+        tx, ty, tz = wy * axis[2] - wz * axis[1], wz * axis[0] - wx * axis[2], wx * axis[1] - wy * axis[0]
+        dx, dy, dz = sweeps[j, STEP] + corner * tx, sweeps[j, STEP + 1] + corner * ty, sweeps[j, STEP + 2] + corner * tz
         square = dx * dx + dy * dy + dz * dz
         if square < _SHORT * _SHORT:
             return False, 0.0
-        to = min(max(t + (vx * dx + vy * dy + vz * dz) / square, 0.0), 1.0)
-        step = abs(to - t)
-        if step * step * square < _SHORT * _SHORT:
-            below = ux * axis[0] + uy * axis[1] + uz * axis[2] < corner
-            return below, np.sqrt(vx * vx + vy * vy + vz * vz) - corner
+        along = vx * dx + vy * dy + vz * dz
+        to = min(max(t + along / square, 0.0), 1.0)
+        step = to - t
+        if bend * step * step < _PLACE:
+            vx, vy, vz = vx - step * dx, vy - step * dy, vz - step * dz
+            ax, ay, az = axis[0] + step * tx, axis[1] + step * ty, axis[2] + step * tz
+            return vx * ax + vy * ay + vz * az < 0.0, np.sqrt(vx * vx + vy * vy + vz * vz) - corner
         t = to
+        tip, axis = tip_at(sweeps, j, t), axis_at(sweeps, j, t)
     return False, 0.0
 
 
@@ -312,15 +317,15 @@ def swept_distance(
         return _round(sweeps, cutters, j, x, y, z, enough)
     if sweeps[j, MODE] != GENERAL:
         return _straight(sweeps, cutters, j, x, y, z, enough)
-    middle = pose_distance(sweeps, cutters, j, 0.5, x, y, z)
-    tip = tip_at(sweeps, j, 0.5)
+    tip, axis = tip_at(sweeps, j, 0.5), axis_at(sweeps, j, 0.5)
+    middle = _distance_at(sweeps, cutters, j, tip, axis, x, y, z)
     away = np.sqrt((x - tip[0]) ** 2 + (y - tip[1]) ** 2 + (z - tip[2]) ** 2)
     half = 0.5 * speed_bound(sweeps, j, away)
     half += 0.5 * half * turn_of(sweeps, j)
     if middle - half > enough or middle <= -enough:
         return middle - half if middle > 0.0 else middle
     if sweeps[j, ANGLE] == 0.0:
-        found, d = _below_ball(sweeps, cutters, j, x, y, z)
+        found, d = _below_ball(sweeps, cutters, j, tip, axis, x, y, z)
         if found:
             return min(d, middle)
     low, high = 0.0, 1.0
