@@ -218,7 +218,9 @@ def integrated(cutter, depth, chip=CHIP, slices=2000, angles=4000, beside=None):
 def test_slots_of_curved_cutters(cutter, depth, limit):
     cut = run(path_through([[95, 0, -depth], [105, 0, -depth]]), BLOCK, cutter)
     force, rate = integrated(cutter, depth * MM)
-    within_goal(f"slots: {cutter.shape}", "force %", force_off(cut.mean[1, :3], force), 100 * limit)
+    off = force_off(cut.mean[1, :3], force)
+    within_goal(f"slots: {cutter.shape}", "force %", off, 100 * limit)
+    assert off < 0.05  # the edges at the tip of a ball, where the profile has no slope, are 1 %
     assert cut.volume[1] == pytest.approx(rate * 10 * MM, rel=limit)
 
 

@@ -50,7 +50,7 @@ NEAR_ZERO = 2e-7
 
 _LEAST_STOCK = 1e-8  # m: thinner is a digit of a number
 _LEAST_ARC = 0.02 * np.pi / 180
-_SMALL_TURN = 30.0 * np.pi / 180
+_FIRST_ARC = 45.0 * np.pi / 180  # at most: proofs of wider ones are rare
 _SMALL_ARC, _SMALLER_ARC, _STRAIGHT_ENOUGH = 12.0 * np.pi / 180, 1.0 * np.pi / 180, 0.02
 _GRAZING = 0.01
 _LEAST_SHARE = 2e-4  # of the radius: the shortest length of profile
@@ -196,7 +196,7 @@ def find_arcs(stock: Stock, pose: Floats, circle: CutterCircle, time: int, arc: 
     arc[:] = 0.0
     arc[_GREATEST], arc[BOUND], arc[_FIRST], arc[_LAST] = -np.inf, -np.inf, np.inf, -np.inf
     arc[_MOST_LEFT], arc[_MOST_RIGHT] = -np.inf, np.inf
-    parts = int(max(4.0, np.ceil((high - low) / (2.0 * _SMALL_ARC))))
+    parts = int(max(4.0, np.ceil((high - low) / _FIRST_ARC)))
     ends, values, lines = np.empty(64), np.empty(64), np.empty((64, 2), np.int64)
     a = low
     ga, first, last = _outside(stock, pose, r, height, a, time)
@@ -212,7 +212,7 @@ def find_arcs(stock: Stock, pose: Floats, circle: CutterCircle, time: int, arc: 
             arc[_GREATEST] = max(arc[_GREATEST], gb)
             wide = r * (b - a)
             above = 0.5 * (ga + gb + wide)
-            if above > 0.0 and ga <= 0.0 and gb <= 0.0 and b - a < _SMALL_TURN:
+            if above > 0.0 and ga <= 0.0 and gb <= 0.0:
                 above = min(above, arc_bound(stock, pose, r, height, a, b, (first, last)) - margin)
             if above <= 0.0:
                 arc[BOUND] = max(arc[BOUND], above)
