@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import each_block
@@ -74,11 +75,13 @@ def build_stock(
     count, covered = np.zeros(cells, np.int64), np.full(cells, np.iinfo(np.int32).max, np.int32)
     _mark_outside(stock, covered)
     live = np.full((_THREADS, len(sweeps), 2), [np.inf, -np.inf])
+    marks = [np.zeros(1 << 16, np.uint8) for _ in range(_THREADS)]
     joins, empty = _go_on(sweeps), np.zeros(0, np.int32)
 
     def list_all(lists: tuple[Ints, Ints, Ints, Singles]) -> None:
         def each(part: slice) -> None:
-            _list(stock, joins, lists, covered, live[part.start], (_THREADS, part.start), slack)
+            k = part.start
+            marks[k] = _list(stock, joins, lists, covered, live[k], (_THREADS, k), slack, marks[k])
 
         each_block(each, _THREADS, 1)
 
@@ -195,13 +198,15 @@ def _list(
     live: Floats,
     turn: tuple[int, int],
     slack: float,
-) -> None:
+    marks: NDArray[np.uint8],
+) -> NDArray[np.uint8]:
     """What is listed of each cell counted, or put into its place where ``near`` has room for it.
 
     lists: numbers (C,) of each cell, or where its own start, and ``near``, ``stop`` and ``planes``.  The sweeps of a
     line, of which each ``joins`` (M,) the one before it, are looked at together: which of them are near a cell, and
     which covers it first, follows from where the cell is along the line.  With a ``slack`` each is listed for itself.
-    turn: of so many threads that of this one; each has other cells, and live (M, 2) of its own.
+    turn: of so many threads that of this one; each has other cells, and live (M, 2) of its own.  marks (K,): a bit for
+    each cell that was looked at, whether a sweep of no line is near; counting writes them, and returns them.
     """
     stock, joins, live, covered = lent_stock(stock), borrowed(joins), borrowed(live), borrowed(covered)
     count, near, stop = borrowed(lists[0]), borrowed(lists[1]), borrowed(lists[2])
@@ -214,7 +219,7 @@ def _list(
     box, other = np.zeros((2, 3)), np.zeros((2, 3))
     first, last = np.zeros(3, np.int64), np.zeros(3, np.int64)
     ends, way, layers = np.zeros(len(sweeps) + 1), np.zeros(3), np.zeros((2, shape[2]))
-    e = -1
+    e, mark = -1, 0
     while e + 1 < len(sweeps):
         s = e + 1
         e = _run_end(sweeps, cutters, joins, s)
@@ -259,8 +264,10 @@ def _list(
                     if covered[cell] < s:
                         continue
                     z = low[2] + (k + 0.5) * size
-                    if not line and is_far(stock.bounds, cutters, s, x, y, z, limit):
-                        continue
+                    if fill and not line:
+                        mark += 1
+                        if marks[(mark - 1) >> 3] >> ((mark - 1) & 7) & 1 == 0:
+                            continue
                     # near is enough: the list of a sweep that is close but does not touch must not stay empty
                     h0 = (x - tip0[0]) * axis0[0] + (y - tip0[1]) * axis0[1] + (z - tip0[2]) * axis0[2]
                     h1 = (x - tip1[0]) * axis1[0] + (y - tip1[1]) * axis1[1] + (z - tip1[2]) * axis1[2]
@@ -287,10 +294,16 @@ def _list(
                             wide = np.sqrt(inner * inner - beside)
                             if along + wide >= 0.0 and along - wide <= ends[e - s + 1]:
                                 covers = s + _place_of(ends, e - s + 1, along - wide)
-                    else:
-                        d = swept_distance(sweeps, cutters, s, x, y, z, limit)
+                    elif not fill:
+                        d = 2.0 * limit
+                        if not is_far(stock.bounds, cutters, s, x, y, z, limit):
+                            d = swept_distance(sweeps, cutters, s, x, y, z, limit)
+                        if mark >> 3 >= len(marks):
+                            marks = np.concatenate((marks, np.zeros(len(marks), np.uint8)))
+                        mark += 1
                         if d > limit:
                             continue
+                        marks[(mark - 1) >> 3] |= np.uint8(1 << ((mark - 1) & 7))
                         covers = s if d <= -half - slack else -1
                     near_last = min(near_last, covered[cell])
                     if covers >= 0 and removes:
@@ -313,6 +326,7 @@ def _list(
                         count[cell] += many if slack > 0.0 else min(many, 1)
                         if covers >= 0:
                             covered[cell] = min(covers, covered[cell])
+    return marks
 
 
 @compiled

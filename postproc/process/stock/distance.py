@@ -287,9 +287,17 @@ def _below_ball(
     bend = 0.5 * corner * (wx * wx + wy * wy + wz * wz)  # from the tangent, of the square of the share
     t = 0.5
     for _ in range(_FEET):
-        vx, vy, vz = x - tip[0] - corner * axis[0], y - tip[1] - corner * axis[1], z - tip[2] - corner * axis[2]
+        vx, vy, vz = (
+            x - tip[0] - corner * axis[0],
+            y - tip[1] - corner * axis[1],
+            z - tip[2] - corner * axis[2],
+        )
         tx, ty, tz = wy * axis[2] - wz * axis[1], wz * axis[0] - wx * axis[2], wx * axis[1] - wy * axis[0]
-        dx, dy, dz = sweeps[j, STEP] + corner * tx, sweeps[j, STEP + 1] + corner * ty, sweeps[j, STEP + 2] + corner * tz
+        dx, dy, dz = (
+            sweeps[j, STEP] + corner * tx,
+            sweeps[j, STEP + 1] + corner * ty,
+            sweeps[j, STEP + 2] + corner * tz,
+        )
         square = dx * dx + dy * dy + dz * dz
         if square < _SHORT * _SHORT:
             return False, 0.0
