@@ -182,8 +182,8 @@ def plan(
     loads [kg] that can be hung at the TCP; tool: mm and deg on the flange; targets: name -> place on the flange, mm;
     sigma_mm: scatter of each measured coordinate.
     """
-    from postproc.workflows.plan import PlanRequest
     from postproc.workflows.plan import plan as run
+    from postproc.workflows.plan_setups import PlanRequest
 
     return run(
         PlanRequest(

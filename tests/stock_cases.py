@@ -98,4 +98,5 @@ def sweeps_of(path, blank, *cutters, rapid=np.inf, edges=None):
         None, "box", np.zeros((1, 1)), 2, None, 1.0, None, 1, cutters, edges, rapid
     )  # fmt: skip
     low, high = corners_of(blank)
-    return find_sweeps(path, frames, process, low, high, "test"), edges
+    place = Poses(np.eye(3)[None], np.zeros((1, 3)))
+    return find_sweeps(path, frames, process, low, high, "test", place), edges

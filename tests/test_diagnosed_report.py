@@ -607,9 +607,10 @@ def test_what_is_said_of_nothing(stale):
     assert paragraph(judged(good, "nothing_missing", conditional=True)).startswith(
         "No effect appears to be missing. A missing effect"
     )
-    assert "clearly smaller than the scatter (" in paragraph(
-        judged(stale, "nothing_missing", reduced_chi2=0.3)
-    )
+    quiet = replace(stale.final, variance=0.3, freedom=60)
+    assert "clearly smaller than the scatter (" in paragraph(judged(stale, "nothing_missing", quiet))
+    few = replace(quiet, freedom=4)  # chance leaves as little
+    assert "clearly smaller than the scatter (" not in paragraph(judged(stale, "nothing_missing", few))
     wild = np.array(stale.final.residual)
     wild[0] += 3e-3
     far = replace(stale)

@@ -1,6 +1,7 @@
 """Laws of what an effect says of itself: bounds, sizes, units, options, the forms in which it is looked for."""
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -189,6 +190,38 @@ def test_options_come_back_as_they_are_described(name):
         assert again.described() == form.described()
         assert again.parameters == form.parameters
         assert again.coordinates == form.coordinates
+
+
+STATED = {
+    "backlash": "friction: 31.5\n",
+    "gravity_compensator": "joint: A3\npreload: acting\nsign: as_printed\nzero_deg: 12.5\n",
+    "thermal_growth": "variable: temperature\nreference: 21.5\n",
+    "transmission_error": "harmonics: [3.5]\n",
+}
+"""Options of the effects that have some: all of them, none at what it is without."""
+
+
+@names
+def test_every_option_is_described(name, compensate, tmp_path):
+    """Also where a robot file is shown; which options there are is said where one is not known."""
+    text, joints = STATED.get(name, ""), kr270().joints
+    with pytest.raises(Refusal) as refused:
+        EFFECTS[name].from_options(options("no_such_option: 1"), joints)
+    known = set(re.findall(r"\w+", refused.value.findings[0].help.partition(": ")[2]))
+    stated = {line.partition(": ")[0]: line.partition(": ")[2] for line in text.splitlines()}
+    assert set(stated) == known
+    effect = EFFECTS[name].from_options(options(text or "{}"), joints)
+    assert {key: str(value) for key, value in effect.described().items()} == stated
+    if not stated:
+        return
+    head = Path("robots/kuka_kr270.yaml").read_text().partition("\neffects:")[0]
+    file = tmp_path / "robot.yaml"
+    braces = ", ".join(f"{key}: {value}" for key, value in stated.items())
+    file.write_text(f"{head}\neffects:\n  - effect: {name}\n    options: {{{braces}}}\n")
+    shown = " ".join(compensate("robots", file).out.split())
+    assert all(f"{key} {value}" in shown for key, value in stated.items())
+    (page,) = compensate("robots", file, "--json", "-").json["robots"][0]["effects"].values()
+    assert {key: str(page[key]) for key in stated} == stated
 
 
 @names

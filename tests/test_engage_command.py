@@ -212,6 +212,19 @@ def test_a_holder_wider_than_its_clearance_has_its_line(folder):
         ("stock: {from: cell.yaml}\n" + TOOLS, "STK016", ["no stock file"], 1),
         ("stock: {base: 7, box: [[0, 0, -30], [100, 60, 0]]}\n" + TOOLS, "STK010", ["base 7"], 1),
         (STOCK + TOOLS + "operations: []\n", "YML004", ["stock"], 5),
+        (
+            "stock: {cylinder: {diameter: 60, height: 20}}\n" + TOOLS,
+            "YML003",
+            ["center", "middle of a cylinder's foot", "goes along +axis"],
+            1,
+        ),
+        ("stock: {base: 1}\n" + TOOLS, "YML003", ["cylinder: {center", "middle of a cylinder's foot"], 1),
+        (
+            "stock: {cylinder: {center: [50, 30, -40], diameter: 60, height: 30}}\n" + TOOLS,
+            "STK008",
+            ["Z -40..-10", "center is the middle of a cylinder's foot"],
+            1,
+        ),
         (TOOLS, "YML003", ["stock"], None),
         (STOCK + TOOLS.replace("shape: flat,", "shape: bull, corner_radius: 9,"), "YML004", ["radius"], 3),
         (
@@ -382,3 +395,14 @@ def test_the_main_job_reports_the_error_of_the_part(folder):
 def test_without_a_stock_there_is_no_part(folder):
     result = CliRunner().invoke(main, ["predict", str(folder / "part.ngc"), "--force=0,100,0", "--json", "-"])
     assert json.loads(result.stdout)["part_error_mm"] is None
+
+
+def test_the_largest_depth_is_that_of_the_whole_motion(folder):
+    """A turn of a helix into solid material: 3 mm deep at its end, where its force is not the largest one."""
+    helix = SLOT.replace(
+        "G0 X-20 Y30 Z5\nG0 Z-5\nG1 X50 F3600\nG1 X120\n", "G0 X40 Y30 Z1\nG3 X40 Y30 Z-3 I6 J0 F1000\n"
+    )
+    (folder / "part.ngc").write_text(helix)
+    result = json.loads(call(folder, "--json", "-").stdout)
+    assert result["tools"]["1"]["ap_max_mm"] == pytest.approx(3.0, abs=0.15)
+    assert result["tools"]["1"]["ae_max_mm"] == pytest.approx(16.0, abs=0.1)

@@ -9,7 +9,7 @@ pytest.importorskip("numba")
 from stock_cases import path_through
 from test_engage_command import SLOT, STOCK, TOOLS, call, folder, refused, state
 
-from postproc.process.stock.tool_comments import read_named_diameters, read_tool_comments
+from postproc.process.tool_comments import read_named_diameters, read_tool_comments
 from postproc.toolpath.toolpath import Annotation
 
 __all__ = ["folder"]

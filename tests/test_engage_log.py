@@ -1,6 +1,8 @@
 """Forces of a log: what is said of their bias, against the closed form of a wall under a spring."""
 
 import json
+import math
+import re
 
 import pytest
 
@@ -54,3 +56,51 @@ def test_without_a_stock_the_bias_is_said_to_be_unknown(folder):
     cell.write_text(cell.read_text().replace("process: milling.yaml", ""))
     (message,) = biases(folder)
     assert "not known, because the cell names no process file with a stock" in message
+
+
+SLOT = "G21 G90 G17 G54 G94\nT1 M6\nS12000 M3\nG0 X-20 Y30 Z5\nG0 Z-4\n"
+SLOT += "G1 X-8 F3600\nG1 X50\nG1 X108\nG1 X120\nG0 Z30\nM2\n"
+EDGES = "{ktc: 780, krc: 190, kac: 210, kte: 22, kre: 21, kae: 1}"
+CHIP = 3600 / 12000 / 3
+
+
+def in_slot(depth=4.0, teeth=3):
+    """[N] feed, left, spindle: mean force of a slot by a flat cutter, in closed form."""
+    steel = dict(part.split(": ") for part in EDGES.strip("{}").split(", "))
+    ktc, krc, kac, kte, kre, kae = (float(value) for value in steel.values())
+    edge = teeth * depth
+    return (
+        -edge * (krc * CHIP / 4 + kre / math.pi),
+        edge * (ktc * CHIP / 4 + kte / math.pi),
+        -edge * (kac * CHIP / math.pi + kae / 2),
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda x, y, z: (x, y, z), None),
+        (lambda x, y, z: (0.6 * x, 1.4 * y, 2.0 * z), None),
+        (lambda x, y, z: (-x, -y, -z), "point 1.. deg away"),
+        (lambda x, y, z: (x, -y, z), "point 12. deg away"),
+        (lambda x, y, z: (x / 1000, y / 1000, z / 1000), "are 0.0011? times"),
+        (lambda x, y, z: (4.45 * x, 4.45 * y, 4.45 * z), "are 4.[2-9] times"),
+    ],
+)
+@pytest.mark.parametrize("source", ["option", "table"])
+def test_forces_that_contradict_the_stock_are_reported(folder, change, words, source):
+    (folder / "part.ngc").write_text(SLOT)
+    tools = TOOLS.replace("{material: EN AW-7075-T6}", f"{{coefficients: {EDGES}, ci95: 0.1}}")
+    (folder / "milling.yaml").write_text(STOCK + tools)
+    force = ",".join(f"{value:.4f}" for value in change(*in_slot()))
+    stated = f"{force}@feed"
+    if source == "table":
+        stated = folder / "forces.csv"
+        stated.write_text(f"line,fx,fy,fz,frame\n7,{force},feed\n8,{force},feed\n")
+    arguments = ["predict", str(folder / "part.ngc"), f"--force={stated}", "--json", "-"]
+    result = CliRunner().invoke(main, arguments)
+    findings = [one for one in json.loads(result.stdout)["findings"] if one["code"] == "FRC040"]
+    assert len(findings) == bool(words), result.output
+    if words:
+        assert re.search(words, findings[0]["message"]), findings
+        assert result.exit_code == 3

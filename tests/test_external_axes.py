@@ -401,6 +401,30 @@ def test_what_moves_unknown_things_is_refused(tmp_path, case):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["arm.yaml", "cell.yaml", "part.src"]
 
 
+def test_a_positioner_matters_where_it_carries_the_base(tmp_path):
+    """Nothing states E2 for motions in base 1, which it does not carry; for base 2, and the way there, it is needed."""
+    table = TABLE.replace("bases: [1]", "bases: [2]")
+    plain = re.sub(r",E[12] [-\d.]+", "", TURNING)
+    for name, more in (("alone", ""), ("beside", table)):
+        (tmp_path / name).mkdir()
+        source = job(tmp_path / name, plain, more)
+        compensate(Request(program=source, force=""))
+    alone, beside = (
+        (tmp_path / name / "compensated" / "part.src").read_text() for name in ("alone", "beside")
+    )
+    assert [line for line in alone.splitlines() if line.startswith("LIN")] == [
+        line for line in beside.splitlines() if line.startswith("LIN")
+    ]
+    later = plain.replace(
+        ";FORCE OFF", "$BASE=BASE_DATA[2]\nLIN {X 10,Y 10,Z 0,A 0,B 0,C 180,E2 5}\n;FORCE OFF"
+    )
+    with pytest.raises(Refusal) as refused:
+        compensate(Request(program=job(tmp_path / "beside", later, table), force=""))
+    (found,) = refused.value.findings
+    assert found.code == "EXT002"
+    assert found.line == later[: later.index("$BASE=BASE_DATA[2]")].count("\n")
+
+
 BAD_CELLS = {
     "a track without a direction": ("E1: {kind: track, limits: [0, 1]}", "YML003", "direction"),
     "a direction of no length": ("E1: {kind: track, direction: [0, 0, 0], limits: [0, 1]}", "YML004", "direction"),
@@ -651,6 +675,7 @@ def test_a_step_of_the_axis_is_followed(tmp_path):
         ("$EX_AX_IGNORE=1", [True, False, False]),
         ("$ASYNC_AXIS='B0001'", [True, False, False]),
         ("$EX_AX_IGNORE=1\n$EX_AX_IGNORE=0", [True, False, True]),
+        ("$EX_AX_IGNORE=1\n$EX_AX_IGNORE=1", [True, False, False]),
         ("$EX_AX_IGNORE=0", [True, True, True]),
     ],
 )

@@ -29,6 +29,7 @@ from postproc.toolpath import (
     Kind,
     OrientationControl,
     PartialTargets,
+    Reflections,
     Toolpath,
 )
 
@@ -116,6 +117,7 @@ def repeated(path: Toolpath, times: int) -> Toolpath:
         partial_targets=PartialTargets(),
         configuration=Configuration(),
         orientation_control=OrientationControl(),
+        reflections=Reflections(),
     )
 
 

@@ -123,6 +123,30 @@ def test_names_that_the_cell_binds() -> None:
     assert "bind #501 under symbols:" in found.findings[0].help
 
 
+PART = "A1:\nG1 X1\nR2=R2+1\nENDLABEL:\nREPEAT A1 P=R1\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "bound"),
+    [
+        ("sinumerik", PART + "G1 X=R2 Y2 Z3\n", ("R1", "R2")),
+        ("sinumerik", "R1=R3\n" + PART + "G1 X=R2 Y2 Z3\n", ("R2", "R3")),
+        # R1 comes from elsewhere, and R2 from the loop
+        ("sinumerik", "R1=$AA_IM[X]\n" + PART.replace("R2+1", "R1") + "G1 X=R2 Y2 Z3\n", ()),
+        ("sinumerik", "L77\n" + PART + "G1 X=R2 Y2 Z3\n", ()),
+        ("sinumerik", "R1=$AA_IM[X]\nG1 X=R1\n", ()),
+        ("fanuc", "WHILE[#1 LT 5]DO1\nG1 X1.\n#1=#1+1\nEND1\nG1 X#1 Y2. Z3.\n", ("#1",)),
+    ],
+)
+def test_only_names_are_to_be_bound_that_help(name: str, text: str, bound: tuple[str, ...]) -> None:
+    """What the program sets itself has that value, whatever the cell states."""
+    helps = [finding.help for finding in read(name, text).findings if finding.code == "GCO005"]
+    (named,) = [re.search(r"bind (.*) under symbols:", one) for one in helps]
+    assert (() if named is None else tuple(sorted(named[1].split(", ")))) == bound
+    last = run(name, text, symbols=dict.fromkeys(bound, 2.0))[-1]
+    assert ("?" in last) == (not bound)
+
+
 def test_the_start_that_the_cell_states() -> None:
     text = "G21 G90 G17 G94\nG1 X5 F60\n"
     start = InitialState(tool=3, base=2, words={"X": 1.0, "Y": 2.0, "Z": 3.0})

@@ -139,6 +139,21 @@ def test_a_word_between_mcall_and_its_cycle_is_not_dropped() -> None:
     assert dropped([("sinumerik", cycle, text) for text in texts]) == []
 
 
+@pytest.mark.parametrize(
+    ("frame", "text"),
+    [
+        ("TRANS X1", "TRANS X8.25 X1"), ("TRANS X1", "TRANS X1 G258"), ("TRANS X1", "G158 TRANS X1"),
+        ("TRANS X1", "TRANS X1 G58"), ("ROT Z0", "ROT Z3 Z0"), ("ROT Z0", "ROT Z0 AROT"),
+        ("TRANS X1", "ATRANS TRANS X1"),
+    ],
+)  # fmt: skip
+def test_a_frame_that_is_stated_twice_is_not_known(frame: str, text: str) -> None:
+    """An axis or a code of a frame is legal once in a block."""
+    assert dropped([("sinumerik", frame, text)]) == []
+    path = read("sinumerik", HEAD["sinumerik"] + text + "\nG1 X5 Y6 Z7\n").toolpath
+    assert len(path) - 1 in path.constraints.refused
+
+
 def test_a_word_that_is_dropped_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """The comparison itself: a reader that overlooks words is found."""
     dialect = DIALECT["linuxcnc"]

@@ -62,7 +62,7 @@ PLAIN = re.compile(rb"[-+]?[\d. \t]+")
 def meaning(code: ModalCode) -> str:
     """``MOTION LINE``, ``UNITS 1``"""
     words = {Group.MOTION: Move, Group.ONCE: Once, Group.FEED: Feed}.get(code.group)
-    return f"{code.group.name} {words(code.value).name if words else code.value}"
+    return f"{code.group.name} {words(code.value).name if words and code.value >= 0 else code.value}"
 
 
 def listing(control: Control, named: dict[bytes, tuple[float, ...]]) -> list[str]:
@@ -172,10 +172,14 @@ def test_an_address_that_is_none_is_not_read(word: str) -> None:
     assert found.findings
 
 
+VIRTUAL = (("ORIVIRT1", False), ("ORIVIRT2", False))
+"""Machine data state what these angles are."""
+
+
 @pytest.mark.parametrize("angles", ["A2=10 B2=20 C2=30", "A2=0 B2=0 C2=0", "C2=5"])
 def test_angles_of_a_mode_that_is_not_read_turn_nothing(angles: str) -> None:
     """ORIRPY2 takes them in another order: the orientation is not known; a tool vector is one in every mode."""
-    for mode, known in (("ORIEULER", True), ("ORIRPY", True), ("ORIRPY2", False)):
+    for mode, known in (("ORIEULER", True), ("ORIRPY", True), ("ORIRPY2", False), *VIRTUAL):
         path = body(f"{mode}\nG1 X1 Y2 Z3 {angles}").toolpath
         said = len(path) - 1 not in path.constraints.refused and bool(np.isfinite(path.rotation[-1]).all())
         assert said == known, mode
@@ -190,6 +194,42 @@ def test_angles_of_the_two_modes_that_are_read_turn_as_they_say() -> None:
         for mode in ("ORIEULER", "ORIRPY")
     }
     assert not np.allclose(turned["ORIEULER"], turned["ORIRPY"], atol=5 * DEG)
+
+
+@pytest.mark.parametrize(
+    ("text", "known"),
+    [
+        ("G1 X1 A3=0 B3=1 C3=1", True),
+        ("ORIMKS\nG1 X1 A3=0 B3=1 C3=1", True),
+        ("TRANS X5\nORIMKS\nG1 X1 Y0 Z0 A3=0 B3=1 C3=1", True),
+        ("ROT Z30\nG1 X1 Y0 Z0 A3=0 B3=1 C3=1", True),
+        ("ROT Z30\nORIMKS\nG1 X1 Y0 Z0 A3=0 B3=1 C3=1", False),
+        ("ORIMKS\nA3=0 B3=1 C3=1\nROT Z30\nG1 X1 Y0 Z0", False),
+        ("ROT Z30\nORIMKS\nA3=0 B3=1 C3=1\nORIWKS\nROT\nG1 X1 Y0 Z0", False),
+        ("ROT Z30\nORIMKS\nORIWKS\nG1 X1 Y0 Z0 A3=0 B3=1 C3=1", True),
+        ("ROT Z30\nORIMKS\nORIEULER\nG1 X1 Y0 Z0 A2=0 B2=9 C2=0", False),
+        # how far the tool turns about its axis
+        ("G1 X1 A3=0 B3=1 C3=1 THETA=0", False),
+        ("THETA=40\nG1 X1 A3=0 B3=1 C3=1", False),
+        ("G1 X1 THETA=IC(4)\nG1 X2", False),
+        ("ORIROTR\nG1 X1 A3=0 B3=1 C3=1", True),
+        ("ORIROTC\nG1 X1 A3=0 B3=1 C3=1", False),
+    ],
+)
+def test_a_tool_vector_that_is_not_certain_turns_nothing(text: str, known: bool) -> None:
+    found = body(text)
+    path, last = found.toolpath, len(found.toolpath) - 1
+    assert bool(np.isfinite(path.rotation[-1]).all()) == known
+    assert (path.constraints.refused[last].code if last in path.constraints.refused else "") == (
+        "" if known else "GCO013"
+    )
+    assert np.isfinite(path.rotation[0]).all()
+
+
+def test_the_turn_of_a_tool_without_vectors_is_not_known_either() -> None:
+    head = "G71 G90 G17 G54 T1 D1\nTRAORI\nG0 X0 Y0 Z100\nF1000\n"
+    assert not read(NAMES["sinumerik"], head + "G1 X1\n").toolpath.constraints.refused
+    assert 1 in read(NAMES["sinumerik"], head + "G1 X1 THETA=20\n").toolpath.constraints.refused
 
 
 @pytest.mark.parametrize("turns", [0, 1, 2, 5])

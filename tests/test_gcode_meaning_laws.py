@@ -181,3 +181,49 @@ SETTINGS_OF_PRINTERS = [
 def test_figures_of_a_machine_are_no_place_to_go_to(control: str) -> None:
     for code in SETTINGS_OF_PRINTERS:
         assert run(control, f"G1 X1 Y2 Z3\nM{code} X100 Y5\nG1 X2\n") == ["1 2 3", "2 2 3"], code
+
+
+@pytest.mark.parametrize(
+    ("text", "end"),
+    [
+        ("G52 X5. Y7.\nG92 X0.\nG52 X0. Y0.\nG1 X20. Y0. Z0.\n", "20 0 0"),  # G92 at X0 with X0: no shift
+        ("G1 X1.\nG52 X5. Y7.\nG92 X0.\nG1 X20. Y0. Z0.\n", "21 7 0"),
+        ("G1 X1.\nG52 X5. Y7.\nG92 X0.\nG52 X0.\nG1 X20. Y0. Z0.\n", "21 7 0"),
+        ("G1 X1.\nG52 X5. Y7.\nG92 X0.\nG52 X3. Y0.\nG1 X20. Y0. Z0.\n", "24 0 0"),
+        ("G1 X1.\nG92 X0.\nG52 X3.\nG52 X0.\nG1 X20. Y0. Z0.\n", "21 0 0"),
+    ],
+)
+def test_g92_of_a_fanuc_cancels_the_local_system_of_its_axes(text: str, end: str) -> None:
+    assert run("fanuc", text)[-1] == end
+
+
+CUT = "G0 X0 Y0 Z5\nG1 Z0 F100\nX5\n"
+LENGTHS = [
+    ("linuxcnc fanuc", "T1 M6\nG43 H1\n" + CUT + "T2 M6\n" + CUT, [9, 10]),
+    ("linuxcnc fanuc", "T1 M6\nG43 H1\n" + CUT + "T2 M6\nG43 H2\n" + CUT, []),
+    ("linuxcnc fanuc", "T1 M6\nG43 H1\n" + CUT + "T2 M6\nG0 X0 Y0 Z5\nG43 H2\nG1 Z0\n", []),
+    ("linuxcnc fanuc", "T1 M6\nG43 H1\n" + CUT + "T2 M6\n" + CUT + "G43 H2\nX6\n", [9, 10]),
+    ("linuxcnc fanuc", "T1 M6\nG43 H1\n" + CUT + "T2 M6\nG49\n" + CUT, []),
+    ("linuxcnc fanuc", "T1 M6\n" + CUT + "T2 M6\n" + CUT, []),
+    ("linuxcnc fanuc", "T1 M6\nG43 H2\n" + CUT + "T2 M6\n" + CUT, [3]),
+    ("linuxcnc fanuc", "T1 M6\nG43 H3\n" + CUT + "T1 M6\n" + CUT, [3]),
+    ("linuxcnc fanuc", "T1\nG43 H1\n" + CUT + "T2\n" + CUT, [9, 10]),
+    ("linuxcnc", "T1 M6\nG43\n" + CUT + "M61 Q2\n" + CUT, [9, 10]),
+    ("linuxcnc", "T1 M6\nG43\n" + CUT + "T2 M6\n" + CUT, [9, 10]),
+    ("linuxcnc", "T1 M6\nG43\n" + CUT + "T2 M6\nG43\n" + CUT, []),
+    ("fanuc", "T1 M6\nG43 H1\n" + CUT + "T2 M6\nG43\n" + CUT, [10, 11]),
+    ("fanuc", "T1 M6\nG43.4 H1\n" + CUT + "T2 M6\n" + CUT, [9, 10]),
+]
+"""Controls, program after a head of a line, and where the length of another tool is reported."""
+
+
+@pytest.mark.parametrize(("controls", "text", "lines"), LENGTHS)
+def test_the_length_of_the_tool_before_a_change_is_reported(
+    controls: str, text: str, lines: list[int]
+) -> None:
+    for control in controls.split():
+        found = read(control, text, "G21 G90 G17 G54 G94\n")
+        reported = [one for one in found.findings if one.code == "GCO023"]
+        first = [reported[0].line] if reported else []
+        assert first == lines[:1], control
+        assert all(f"{len(lines)} blocks" in one.message for one in reported if len(lines) > 1)

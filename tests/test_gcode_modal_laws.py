@@ -89,9 +89,9 @@ def test_the_external_offset_of_a_fanuc_moves_all_others(words: str, known: bool
 
 
 @pytest.mark.parametrize("switch", ["", "/"])
-@pytest.mark.parametrize("mode", ["", "M73\n"])
+@pytest.mark.parametrize("mode", ["", "o999 return\n"])
 def test_what_is_assigned_in_a_block_that_a_switch_leaves_out_is_not_known(switch: str, mode: str) -> None:
-    """Where a run is followed, and where M73 keeps it from being."""
+    """Where a run is followed, and where a return in no subprogram keeps it from being."""
     text = f"G21 G90 G17 G54 T1\n{mode}G0 X0. Y0. Z0.\nF600\n#1=4.\n{switch}#1=9.\nG1 X#1\nM30\n"
     last = read(text, "linuxcnc").toolpath.position[-1, 0] * 1e3
     assert np.isnan(last) if switch else last == pytest.approx(9.0)

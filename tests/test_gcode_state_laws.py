@@ -19,7 +19,7 @@ from postproc.languages.gcode import DIALECTS as GCODE
 from postproc.languages.gcode.code_tables import LINUXCNC
 from postproc.languages.gcode.comments import head
 from postproc.languages.gcode.control import ProgrammedFrame
-from postproc.languages.gcode.execution_flow import ExecutionFlow, FlowReason
+from postproc.languages.gcode.execution_flow import NONE_SAVED, ExecutionFlow, FlowReason
 from postproc.languages.gcode.lexing import lex
 from postproc.languages.gcode.modal_fill import FilledRows, everywhere, fill_modal, lookup, switched
 from postproc.languages.gcode.numbered import references
@@ -161,7 +161,7 @@ def test_the_last_block_of_those_in_doubt() -> None:
             while doubt[row] and last + 1 < n and doubt[last + 1]:
                 last += 1
             expected.append(last)
-        assert ExecutionFlow(doubt, no, no, no, no, no, no, no).last.tolist() == expected
+        assert ExecutionFlow(doubt, no, no, no, no, no, no, no, NONE_SAVED).last.tolist() == expected
     assert FlowReason.NONE == 0
 
 
@@ -366,6 +366,10 @@ def test_frames_of_bases_and_tools() -> None:
     [
         ("5200", False), ("5201", True), ("5400", True), ("5401", False), ("7000", False), ("7001", True),
         ("7999", True), ("8000", False), ("14000", False), ("14001", True), ("20000", True), ("20001", False),
+        ("2400", False), ("2401", True), ("2500", True), ("2501", True), ("2606", True), ("2806", True), ("2999", True),
+        ("3000", False), ("3003", False), ("3004", False), ("3005", True), ("3006", False), ("5499", False),
+        ("5521", True), ("5701", False), ("26000", True), ("26999", True), ("27000", False), ("100000", False),
+        ("100051", True), ("115351", False),
         ("000005221", True), ("1", False), ("5221000000", False), ("[5221]", True), ("<a>", False), ("x", True),
     ],
 )  # fmt: skip
@@ -373,6 +377,15 @@ def test_variables_that_are_offsets(text: str, offset: bool) -> None:
     """A variable that is computed may be one; those with a name are none."""
     path = read(NAMES["fanuc"], f"G21 G90 G54\nG0 X0 Y0 Z50\n#{text}=1\nG1 X1 F100\nM30\n").toolpath
     assert path.base.tolist() == [0, -1 if offset else 0]
+
+
+@pytest.mark.parametrize("number", [2401, 2501, 2806, 3005, 4999])
+def test_variables_of_linuxcnc_below_5000_are_the_programs_own(number: int) -> None:
+    path = read(
+        NAMES["linuxcnc"], f"G21 G90 G54\nG0 X0 Y0 Z50\n#{number}=1\nG1 X#{number} F100\nM2\n"
+    ).toolpath
+    assert path.base.tolist() == [0, 0]
+    np.testing.assert_allclose(path.position[:, 0], [0, 1e-3])
 
 
 WEIGHTS = (100, 101, 102, *range(129, 138), 231, 233, 234)

@@ -112,3 +112,9 @@ def test_an_exponent_is_taken_by_some_controls_only(name: str, number: str) -> N
 
 def test_an_address_e_of_its_own_is_no_exponent() -> None:
     assert ends("linuxcnc", "G1 X5.E0.1\nX6. E-1\n") == ["5 0 0", "6 0 0"]
+
+
+def test_a_code_and_a_number_beyond_all_machines_have_no_exponent() -> None:
+    """Printers write G92E0 and X50E8 without blanks; 5 km may be 5000 E3."""
+    assert ends("linuxcnc", "G92E0\nG1E3\nG1X50E8\n") == ["50 0 0"]
+    assert ends("linuxcnc", "G1X5000E3\nX50E5\nX0E5\nX1Y-3E7\n") == ["?", "?", "?", "1 -3 0"]

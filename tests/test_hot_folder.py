@@ -168,3 +168,63 @@ def test_a_signal_stops_it(hot):
     _, words_of_end = run.communicate(timeout=60)
     assert run.returncode == 128 + 15
     assert "continues from here" in words_of_end
+
+
+GCODE = """\
+%
+G21 G90 G17 G54
+T1 M6
+S9000 M3
+G0 X150. Y60. Z30.
+(FORCE 120 260 -60 @BASE)
+G1 Z-2. F400
+G1 X230. F1800
+(FORCE OFF)
+G0 Z30.
+M30
+%
+"""
+
+
+def reports_of(folder):
+    return {
+        Path(json.loads(path.read_bytes())["program"]).name: path.read_bytes()
+        for path in folder.glob("*.report.json")
+    }
+
+
+def test_no_program_takes_the_reports_of_another(compensate, hot):
+    """Two programs whose reports have one name: the second is refused, and the reports of the first stay."""
+    (hot / "cell.yaml").write_text(f"{CELL}orientation: {{a: 0, b: 0, c: 180}}\n")
+    (hot / "one.ngc").write_text(GCODE)
+    (hot / "one.src").write_bytes(named("one"))
+    (hot / "one.dat").write_bytes(b"DEFDAT one\r\nENDDAT\r\n")
+    done = compensate(*words(hot, "--json", "-"))
+    rows = {row["name"]: row for row in map(json.loads, done.out.splitlines())}
+    assert {name: row["state"] for name, row in rows.items()} == {"one.ngc": "done", "one.src": "failed"}
+    assert rows["one.src"]["findings"][0]["code"] == "BAT002"
+    assert done.code == 1
+    assert {path.name for path in (hot / "done").iterdir()} == {"one.ngc"}
+    assert {"one.src", "one.dat"} <= {path.name for path in (hot / "failed").iterdir()}
+    kept = reports_of(hot / "compensated")
+    assert kept.keys() == {"one.ngc"}
+    assert not (hot / "compensated" / "one.src").exists()
+    # somebody who asks for it by name replaces them, and reads of it
+    alone = hot / "failed" / "one.src"
+    command = [alone, "--force", "-o", hot / "compensated", "--cell", hot / "cell.yaml"]
+    done = compensate(*command)
+    assert done.code == 0
+    assert "FIL016 the reports replace those of one.ngc" in (done.out + done.err).replace("\n", " ")
+    assert "FIL016" not in compensate(*command).out
+    assert reports_of(hot / "compensated").keys() == {"one.src"}
+
+
+def test_predictions_of_another_program_are_replaced_in_words(compensate, hot):
+    (hot / "cell.yaml").write_text(f"{CELL}orientation: {{a: 0, b: 0, c: 180}}\n")
+    (hot / "one.ngc").write_text(GCODE)
+    (hot / "one.src").write_bytes(named("one"))
+    predict = ["predict", "--force", "--report", hot / "shown"]
+    assert compensate(*predict, hot / "one.src").code == 0
+    done = compensate(*predict, hot / "one.ngc", "--json", "-")
+    (found,) = [one for one in done.json["findings"] if one["code"] == "FIL016"]
+    assert found["message"] == "the reports replace those of one.src, which have the same names"

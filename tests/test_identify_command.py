@@ -215,6 +215,24 @@ def test_a_file_to_validate_with_is_checked_as_the_others(compensate, loads, tmp
     assert not new.exists()
 
 
+def test_a_tool_that_the_readings_contradict_is_reported(compensate, loads):
+    words = ["identify", loads, "--effects", "joint_compliance.c5", "--bootstrap", "0", "--tool"]
+    done = compensate(*words, "0,0,200")
+    assert "IDN036 --tool is ignored: the readings state the tool 0 500 200 0 0 0" in done.err + done.out
+    assert "IDN036" not in compensate(*words, "0,500,200").out
+
+
+@pytest.mark.parametrize("command", ["identify", "diagnose"])
+def test_readings_that_are_fitted_validate_nothing(compensate, loads, tmp_path, command):
+    copy = tmp_path / "copy.csv"
+    copy.write_bytes(loads.read_bytes() + b"\n")
+    words = [command, loads, "--validate", copy, "-o", tmp_path / "new.yaml"]
+    done = compensate(*words, *(["--effects", "joint_compliance"] if command == "identify" else []))
+    assert done.code == 1
+    assert "copy.csv MEA008 all readings of the file are fitted" in done.err
+    assert not (tmp_path / "new.yaml").exists()
+
+
 def test_what_can_not_be_done(compensate, loads, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for words, told in (

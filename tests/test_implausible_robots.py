@@ -12,6 +12,8 @@ from postproc.robot.description import load_robot
 ARM = (Path(__file__).parent.parent / "robots" / "kuka_kr270.yaml").read_text()
 C2 = "value: 0.302e-6, unit: rad/(N m), ci: 0.004e-6, ci_level: unstated"
 
+GAP = "  - {effect: backlash, parameters: {b1: {value: 0.5, unit: deg, source: none}}}\n"
+
 
 @pytest.mark.parametrize(
     ("old", "new", "said"),
@@ -26,6 +28,12 @@ C2 = "value: 0.302e-6, unit: rad/(N m), ci: 0.004e-6, ci_level: unstated"
             "gravity_compensator.s0 is 0.000458",
         ),
         ("value: 184.72, unit: mm", "value: 0.18472, unit: mm", "gravity_compensator.L is 0.00018472"),
+        ("kuka: {unit: mm,", "kuka: {unit: m,", "the arm is 3179 m long"),
+        (
+            "effects:\n",
+            "effects:\n" + GAP,
+            "backlash.b1 is 0.00872665 rad; built hardware has 0 to 0.004 rad",
+        ),
     ],
 )
 def test_a_number_in_another_unit_is_reported(tmp_path, old, new, said):

@@ -55,6 +55,25 @@ def test_units_may_stand_in_the_header_and_are_checked(tmp_path):
     assert "unit" in refused(write(tmp_path, columns="X,Y,Z,NX,NY,NZ,DEV [um]")).message
 
 
+def test_decimal_commas_and_points_in_one_file_are_refused(tmp_path):
+    """A file with commas throughout is read as the one with points."""
+    head, columns = {"sigma_mm": "0,01"}, COLUMNS.replace(",", ";")
+    rows = [row.replace(",", ";").replace(".", ",") for row in ROWS]
+    part = read_measured_part(write(tmp_path, head, columns, rows))
+    np.testing.assert_array_equal(part.deviation, read_measured_part(write(tmp_path)).deviation)
+    rows[3] = rows[3].replace("30;", "1.030;", 1)
+    finding = refused(write(tmp_path, head, columns, rows))
+    assert "'1.030' has a point" in finding.message
+    assert finding.line == len(HEAD) + 5
+
+
+@pytest.mark.parametrize("place", ["20,5 20.0 -3", "20,0;20.0;-3"])
+def test_a_checked_place_with_commas_and_points_is_refused(tmp_path, place):
+    finding = refused(write(tmp_path, {"checked": f"{place} material_missing"}))
+    assert "checked" in finding.message
+    assert "is not understood" in finding.message
+
+
 @pytest.mark.parametrize("key", sorted(HEAD))
 def test_every_mandatory_comment_is_asked_for(tmp_path, key):
     assert key in refused(write(tmp_path, {key: None})).message

@@ -8,9 +8,12 @@ from effect_cases import made, nulls, with_terms
 from path_cases import START, circle, line, task
 
 from postproc.base.geometry import Poses, rotation_from_abc, rotation_from_vector
+from postproc.compensation.correct import correct
 from postproc.compensation.gap_sides import MotorPath, Reversals
 from postproc.compensation.lost_motion import ROOM, add_lost_motion, dead_band, position_digit
 from postproc.compensation.reversals import find_reversals
+from postproc.compensation.subdivide import subdivide
+from postproc.compensation.subdivision import Limits
 from postproc.robot.inverse import inverse
 from postproc.toolpath import Kind
 
@@ -90,7 +93,10 @@ def test_corrections_change_sides_where_an_axis_turns_round():
 def test_reversals_are_the_places_for_points():
     job = lossy(line(kind=[Kind.LIN] * 4), axes=(2,))
     rows, along = find_reversals(job, np.full(4, SPACING))
-    inside = rows == 2
+    # where the cut starts another reversal ends, as near behind it as a point may be
+    first = (rows == 2) & (along * job.desired_path.length[2] < 1.001 * SPACING)
+    assert first.sum() == 1
+    inside = (rows == 2) & ~first
     assert inside.sum() == 2
     wanted = job.lost_motion.wanted
     side = wanted.at(rows[inside], along[inside])[:, 1]
@@ -101,6 +107,28 @@ def test_reversals_are_the_places_for_points():
     assert not len(find_reversals(line(), far)[0])  # nothing is asked for
     small = lossy(line(), axes=(2,), gap=0.1 * ROOM * job.tolerance)
     assert not len(find_reversals(small, np.full(4, SPACING))[0])  # nothing shows
+
+
+def test_behind_a_reversal_between_two_motions_one_point_is_enough():
+    """There and straight back along a line: the motor crosses its gap behind the turning point, sooner than a point may
+    be; from the nearest one on the correction runs straight."""
+    points = [[1.4, 0.0, 0.6], [1.4, 0.0, 0.5], [1.4, 0.1, 0.5], [1.4, 0.0, 0.5], [1.4, 0.0, 0.6]]
+    job = task(points, [False, False, True, True, False], wrench=np.zeros(6), kind=[Kind.LIN] * 5)
+    job = lossy(job, axes=(1,))
+    done = subdivide(job, correct(job), Limits(max_growth=100.0))
+    back = np.flatnonzero(done.source == 3)
+    assert 2 <= len(back) <= 3
+    place = done.share[back] * job.desired_path.length[3]
+    assert place[0] == pytest.approx(1e-3, rel=1e-6)
+    rows, share = np.full(40, 3), np.linspace(2.5e-3, 0.1, 40) / 0.1
+    ends = np.flatnonzero(np.isin(done.source, [3]))
+    along = np.interp(share, done.share[ends], np.arange(len(ends)))
+    low = np.minimum(along.astype(int), len(ends) - 2)
+    one, two = (done.command[ends[at]].position for at in (low, low + 1))
+    written = one + (along - low)[:, None] * (two - one)
+    wanted = job.desired_path.at(rows, share)
+    meant = job.command(rows, wanted, np.zeros((40, 6)), job.goal(rows, wanted), share=share).command.position
+    assert np.abs(written - meant).max() < 2e-6
 
 
 def zigzag(step, count=40, y=0.0):
@@ -261,7 +289,8 @@ def test_an_axis_that_turns_round_shortly_before_the_end_is_seen(sweep):
 def test_a_correction_just_behind_a_reversal_is_that_of_the_new_side():
     job = lossy(line(wrench=np.zeros(6), kind=[Kind.LIN] * 4), axes=(2,))
     rows, along = find_reversals(job, np.full(4, SPACING))
-    rows, along = rows[rows == 2], along[rows == 2]
+    inside = (rows == 2) & (along * job.desired_path.length[2] > 1.001 * SPACING)
+    rows, along = rows[inside], along[inside]
     wanted, none = job.desired_path.at(rows, along), np.zeros((2, 6))
     goal = job.goal(rows, wanted)
     done = job.command(rows, wanted, none, goal, share=along)

@@ -279,6 +279,20 @@ def test_numbers_of_comments(read, text, place):
     assert np.allclose(r.places["a"], np.array(place) * MM)
 
 
+@pytest.mark.parametrize("text", ["1.000 0,5 2", "0,5; 1.5;2", "1.000;2;3,5"])
+def test_points_and_commas_in_one_comment_are_refused(read, text):
+    finding = refused(read, f"# target a: {text}", "{A},X,Y,Z,TARGET", "{Q},1,2,3,a")
+    assert (finding.code, finding.line) == ("MEA001", 1)
+    assert "is not understood" in finding.message
+    assert "in all of them" in finding.help
+
+
+def test_points_beside_decimal_commas_are_refused(read):
+    finding = refused(read, "A1;A2;A3;A4;A5;A6;X;Y;Z", "0;-90,25;90;0;45;10;1.500;2;3")
+    assert (finding.code, finding.line) == ("MEA001", 2)
+    assert "column X: '1.500' has a point" in finding.message
+
+
 def test_a_single_number_may_have_a_decimal_comma(read):
     assert read("# sigma_mm: 0,02", "{A},X,Y,Z", "{Q},1,2,3").sigma[0] == pytest.approx(2e-5)
 

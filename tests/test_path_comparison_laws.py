@@ -223,3 +223,10 @@ def test_a_path_that_was_worse_between_its_points_is_compared_with_that():
     args = output(profiled, np.zeros((5, 3))), np.full(5, 5e-6), np.full(5, 1e-4)
     assert cuts_not_improved(profiled, two, *args) == {}
     assert list(cuts_not_improved(job, two_cuts(job, before={3: 1.0, 4: 1.0}), *args)) == [3]
+    # nor where the path is as far off as it was, to the digits of a program
+    as_far = (
+        output(profiled, np.zeros((5, 3))),
+        np.array([5.0, 5.0, 5.0, 200.5, 5.0]) * 1e-6,
+        np.full(5, 1e-4),
+    )
+    assert list(cuts_not_improved(profiled, two, *as_far)) == [3]

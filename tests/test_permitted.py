@@ -167,6 +167,58 @@ def test_blocks_keep_what_is_no_coordinate(name, raw):
             judged(raw, dialect, edit)
 
 
+LINUXCNC = b"""G21 G90 G17 G94
+#<w>=3
+G1 X1 Y[#<w>*2] F[#<w>*100]
+G1 X2 Y#<w>
+G1 X[SIN[30]*4] Y-ATAN[1]/[#<w>] M8
+G1 X3 (note #<w>) Y4
+"""
+SINUMERIK = b"""G90 G71 G17 G94
+DEF REAL WE=3
+G1 X1 Y=WE*2 FB=WE*100
+G1 X=SIN(30)*4 Y=WE M8
+G1 X=AC(WE MOD 2) Y=WE+2*(WE-1)
+"""
+EXPRESSIONS = {
+    "an expression": (True, LINUXCNC, changed(LINUXCNC, b"G1 X1", b"[#<w>*2]", b"6.1")),
+    "a named parameter": (True, LINUXCNC, changed(LINUXCNC, b"G1 X2", b"#<w>", b"3.1")),
+    "functions": (True, LINUXCNC, changed(LINUXCNC, b"G1 X[SIN", b"[SIN[30]*4]", b"2.1")),
+    "a function of two": (True, LINUXCNC, changed(LINUXCNC, b"G1 X[SIN", b"-ATAN[1]/[#<w>]", b"2.1")),
+    "a block with its feed": (True, LINUXCNC, behind(LINUXCNC, b"=3\n", b"G1 X0.5 Y1 F[#<w>*100]\n")),
+    "a feed": (False, LINUXCNC, changed(LINUXCNC, b"G1 X1", b"[#<w>*100]", b"6.1")),
+    "the coolant with it": (False, LINUXCNC, changed(LINUXCNC, b"G1 X[SIN", b"-ATAN[1]/[#<w>] M8", b"2.1")),
+    "half of it": (False, LINUXCNC, changed(LINUXCNC, b"G1 X[SIN", b"[SIN[30]", b"2.1")),
+    "a word with it": (False, LINUXCNC, changed(LINUXCNC, b"G1 X1", b"1 Y[#<w>*2]", b"2.1")),
+    "a comment with it": (False, LINUXCNC, changed(LINUXCNC, b"G1 X3", b"3 (note #<w>)", b"2.1")),
+    "in a comment": (False, LINUXCNC, changed(LINUXCNC, b"G1 X3", b"#<w>", b"2.1")),
+    "a block with more": (False, LINUXCNC, behind(LINUXCNC, b"=3\n", b"G1 X0.5 F[#<w>*100] M[#<w>]\n")),
+    "a block with a comment": (False, LINUXCNC, behind(LINUXCNC, b"=3\n", b"G1 X0.5 F[#<w>(x)]\n")),
+    "an assignment": (False, LINUXCNC, behind(LINUXCNC, b"=3\n", b"G1 X0.5 #<w>=5\n")),
+    "a sum": (True, SINUMERIK, changed(SINUMERIK, b"G1 X=AC", b"WE+2*(WE-1)", b"7.1")),
+    "an absolute one": (True, SINUMERIK, changed(SINUMERIK, b"G1 X=AC", b"WE MOD 2", b"1.1")),
+    "a function of it": (True, SINUMERIK, changed(SINUMERIK, b"G1 X=SIN", b"SIN(30)*4", b"2.1")),
+    "a variable": (True, SINUMERIK, changed(SINUMERIK, b"G1 X=SIN", b"WE", b"2.1")),
+    "a block with a feed": (True, SINUMERIK, behind(SINUMERIK, b"REAL WE=3\n", b"G1 X=0.5 F=WE*3\n")),
+    "two words": (False, SINUMERIK, changed(SINUMERIK, b"G1 X=SIN", b"SIN(30)*4 Y=WE", b"2.1")),
+    "its coolant": (False, SINUMERIK, changed(SINUMERIK, b"G1 X=SIN", b"WE M8", b"2.1")),
+    "a feed of a block": (False, SINUMERIK, changed(SINUMERIK, b"G1 X1", b"WE*100", b"7.1")),
+    "a block with its name": (False, SINUMERIK, behind(SINUMERIK, b"REAL WE=3\n", b"G1 X=0.5 WE=3\n")),
+    "a call": (False, SINUMERIK, behind(SINUMERIK, b"REAL WE=3\n", b"G1 X=0.5 LOAD(3)\n")),
+}
+
+
+@pytest.mark.parametrize("name", EXPRESSIONS)
+def test_expressions_of_coordinates_have_names_of_their_own(name):
+    good, raw, edit = EXPRESSIONS[name]
+    dialect = "linuxcnc" if raw is LINUXCNC else "sinumerik"
+    if good:
+        judged(raw, dialect, edit)
+    else:
+        with pytest.raises(Refusal):
+            judged(raw, dialect, edit)
+
+
 @pytest.mark.slow
 def test_one_wrong_edit_among_many_is_found():
     """In whichever block of edits it is, and the first of several is told."""

@@ -28,6 +28,7 @@ from postproc.placement.search_places import distinct, start_places
 from postproc.report.placement import Placement
 from postproc.workflows.place import place
 from postproc.workflows.place_problem import PlaceRequest, place_problem
+from postproc.workflows.place_units import metre_ranges
 from postproc.workflows.preparation import Request, prepare
 
 SLOW = pytest.mark.slow
@@ -401,6 +402,29 @@ def test_nothing_is_read_but_written_where_asked(job, compensate):
     assert "collisions are NOT checked" in shown[0]
 
 
+@pytest.mark.slow
+def test_one_value_is_where_the_part_lies(job, compensate):
+    """As a range that is hardly wider says."""
+    words = ["place", job.program, "--force", "--x", "1400:1600", "--json", "-"]
+    one = compensate(*words, "--y=-250").json
+    narrow = compensate(*words, "--y=-250.001:-249.999").json
+    assert one["room"]["y_mm"] == [-250.0, -250.0]
+    assert {place["y_mm"] for place in one["places"]} == {-250.0}
+    assert one["best"]["x_mm"] == pytest.approx(narrow["best"]["x_mm"], abs=2.0)
+    assert one["best"]["across_feed_mm"]["max"] == pytest.approx(
+        narrow["best"]["across_feed_mm"]["max"], rel=0.01
+    )
+    shown = compensate("place", job.program, "--force", "--x", "1400:1600", "--y=-250").out
+    assert "x 1400 .. 1600 mm, y -250 mm" in shown
+
+
+def test_metres_are_reported_of_feasible_places_too():
+    assert [one.code for one in metre_ranges({"x": (0.01, 0.15)}, "cell.yaml")] == ["PLC022"]
+    assert "--y 950" in metre_ranges({"y": (0.95, 0.95)}, "cell.yaml")[0].help
+    assert metre_ranges({"x": (0.01, 10.0)}, "cell.yaml") == []
+    assert metre_ranges({"turn": (0.01, 0.15)}, "cell.yaml") == []
+
+
 LIMIT = ["PLC002", "deg from its limit of", "margin 80"]
 SINGULAR = ["PLC002", "singularity", "margin 55"]
 
@@ -409,8 +433,10 @@ SINGULAR = ["PLC002", "singularity", "margin 55"]
     ("words", "code", "said"),
     [
         ([], 1, ["PLC003", "no freedom has a range", "--x a:b"]),
-        (["--x", "1500"], 2, ["no range a:b"]),
-        (["--x", "1500:1500"], 2, ["no width"]),
+        (["--x", "1500:1600:1700"], 2, ["neither one value nor a range a:b"]),
+        (["--x", "1500:1500"], 2, ["no width", "for one value write 1500"]),
+        (["--x", "1400"], 1, ["PLC003", "no freedom has a range"]),
+        (["--x", "1400", "--spin"], 1, ["PLC003", "no freedom has a range"]),
         (["--turn=30:-30"], 2, ["no width", "not below", "write -30:30"]),
         (["--turn=-400:30"], 2, ["-400 exceeds 360"]),
         (["--x", "a:b"], 2, ["'a' is not a number"]),

@@ -135,6 +135,17 @@ def test_places_in_other_units_are_reported(job, compensate):
     assert "PLC021" in {one["code"] for one in done.json["findings"]}
 
 
+def test_two_places_at_one_spot_are_refused(parts, compensate):
+    """Of several parts: one part may be compared with itself, turned."""
+    job, programs = parts
+    places = ["--at", "a=1500,-200,600", "--at", "b=1500,-200.0001,600,90"]
+    done = compensate("assign", *programs, "--force", *places)
+    assert done.code == 1
+    assert "PLC023 the places a and b are at one spot" in done.err
+    done = compensate("assign", job.program, "--force", *places)
+    assert "PLC023" not in done.err
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

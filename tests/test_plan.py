@@ -337,6 +337,28 @@ def test_the_harder_one_is_named():
 # Wrong input
 
 
+def test_all_of_an_axis_is_no_wider_than_it_is(compensate, out):
+    options = ["--poses", 4, "--limits", "A2=-146:0", "--limits", "A3=:"]
+    assert compensate(*ROBOT, *TWO, *LEVER, *options, "-o", out).code == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "named", "written"),
+    [
+        (["--target", "M1=0.3,0,0.1"], "--target M1", "0.3 mm"),
+        (["--tool", "0,-0.5,0.3"], "--tool", "0.5 mm"),
+        (["--target", "M1=300,0,100", "--tracker=3,0,-1"], "--tracker", "3 mm"),
+    ],
+)
+def test_lengths_in_metres_are_reported(compensate, out, options, named, written):
+    """As ``identify`` reports them above its readings."""
+    done = compensate(*ROBOT, *TWO, "--loads", 265, "--poses", 6, *options, "-o", out, "--json", "-")
+    assert done.code == 3
+    (found,) = [one for one in done.json["findings"] if one["code"] == "MEA014"]
+    assert found["message"] == f"{named}: its largest coordinate is {written}, as if it were in metres"
+    assert out.exists()
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -351,6 +373,7 @@ def test_the_harder_one_is_named():
         (["--poses", "5", "--box", "5:1,:,:"], "ascending"),
         (["--poses", "5", "--limits", "A2"], "not JOINT=a:b"),
         (["--poses", "5", "--criterion", "test"], "--test PROGRAM"),
+        (["--poses", "5", "--cone", "10"], "needs --tracker"),
         (["--poses", "5", "--force"], "--test PROGRAM"),
         (["--poses", "5", "--rough-targets"], "--target"),
         (["--poses", "5", "--loads", "5", "--one-load"], "several --loads"),
@@ -362,7 +385,9 @@ def test_the_harder_one_is_named():
     ],
 )
 def test_wrong_command_line(compensate, out, options, words):
-    done = compensate(*ROBOT, *TWO, "-o", out, *options)
+    output = () if "-o" in options else ("-o", out)
+    effects = () if "--effects" in options else TWO
+    done = compensate(*ROBOT, *effects, *output, *options)
     assert done.code == 2
     assert words in done.err
     assert not out.exists()
@@ -379,6 +404,12 @@ def test_wrong_command_line(compensate, out, options, words):
         ([*TWO, "--loads", "0"], "PLN005"),
         ([*TWO, *LEVER, "--limits", "A9=0:1"], "PLN006 --limits: 'A9' is not a joint"),
         ([*TWO, *LEVER, "--limits", "A2=10:20"], "PLN001 A2 cannot move within 10 .. 20 deg"),
+        (
+            [*TWO, *LEVER, "--limits", "A2=-200:50"],
+            "PLN006 --limits: the range A2=-200:50 is beyond the limits -146 .. 0 deg of kuka_kr270",
+        ),
+        ([*TWO, *LEVER, "--limits", "A2=-146.01:"], "PLN006 --limits: the range A2=-146.01:inf is beyond"),
+        ([*TWO, *LEVER, "--limits", "A2=:0.01"], "PLN006 --limits: the range A2=-inf:0.01 is beyond"),
         ([*TWO, *LEVER, "--wanted", "c9=1%"], "PLN006 --wanted c9=1%: 'c9' is not requested"),
         (
             [*TWO, *LEVER, "--wanted", "c2=1mm"],
@@ -395,7 +426,6 @@ def test_wrong_command_line(compensate, out, options, words):
             "PLN006 --discriminate: backlash and backlash.b2",
         ),
         ([*TWO, *LEVER, "--discriminate", "gravity_compensator.L,backlash"], "its dimensions are known"),
-        ([*TWO, *LEVER, "--robot", "kr271"], "CEL003"),
     ],
 )
 def test_refusals(compensate, out, options, words):
@@ -404,6 +434,41 @@ def test_refusals(compensate, out, options, words):
     assert words in done.err.replace("\n", " ")
     assert "nothing is written" in done.err
     assert not out.exists()
+
+
+def test_lists_may_be_given_in_several_times(compensate, tmp_path):
+    """All of them count: none is lost because another one came after it."""
+    plans = []
+    for name, words in (
+        ("one.csv", ["--effects", "joint_compliance.c2,joint_compliance.c3", "--loads", "100,200"]),
+        ("several.csv", ["--effects=joint_compliance.c2", "--effects=joint_compliance.c3"]),
+    ):
+        loads = [] if "--loads" in words else ["--loads=100", "--loads=200"]
+        done = compensate(*ROBOT, *words, *loads, "--tool", "0,500,300", "--poses", 5, "-o", tmp_path / name)
+        assert done.code in (0, 3), done.err
+        plans.append((tmp_path / name).read_text())
+    assert plans[0] == plans[1]
+    twice = compensate(*ROBOT, *TWO, *LEVER, "--poses", 5, "-o", tmp_path / "no.csv", *2 * ["--wanted=c2=1%"])
+    assert twice.code == 2
+    assert "'c2' occurs twice" in twice.err
+
+
+def test_robot_that_does_not_exist(compensate, out):
+    done = compensate("plan", "--robot", "kr271", *TWO, *LEVER, "--poses", 5, "-o", out)
+    assert done.code == 1
+    assert "CEL003" in done.err
+
+
+def test_a_load_above_the_rated_payload(compensate, out, tmp_path):
+    robot = tmp_path / "rated.yaml"
+    stated = find_robot("kuka_kr270").read_text()
+    robot.write_text(f"{stated}\nrated_payload: {{value: 260, unit: kg, source: data sheet}}\n")
+    words = ["plan", "--robot", robot, *TWO, "--tool", "0,500,300", "--poses", 5, "-o", out, "--loads"]
+    done = compensate(*words, "100,265")
+    assert done.code == 1
+    assert "PLN006 a load of 265 kg is above the rated payload of 260 kg" in done.err.replace("\n", " ")
+    assert not out.exists()
+    assert compensate(*words, "100,260").code in (0, 3)
 
 
 def test_names_of_two_effects_are_told(compensate, out):

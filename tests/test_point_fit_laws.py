@@ -3,6 +3,8 @@ on the direction in which a curve is gone."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
@@ -407,6 +409,31 @@ def test_a_close_fit_is_much_nearer_than_its_start() -> None:
     drawn = rounded(points[0], words[0][0])
     true = np.abs(drawn[:, 1] - slope * np.clip(drawn[:, 0], 0.0, 8.0 * MM)).max()
     assert largest == pytest.approx(true, rel=0.03)
+
+
+def test_beside_each_turn_errors_are_least_together() -> None:
+    """Of drawn paths round two turns: where one of them has to be far off, the other one need not be as well."""
+    words = np.full((1, 7), 0.5 * MM), np.full((1, 6), 0.6 * MM)
+    parameter, shares = np.array([[-30.0, *START, 38.0]]) * MM, []
+    for first, second in ((0.1, 0.9), (0.2, -0.9), (0.9, 0.1), (-0.1, 0.5)):
+
+        def height(x: np.ndarray, one: float = first, two: float = second) -> np.ndarray:
+            return one * np.maximum(x, 0.0) + two * np.maximum(x - 8.0 * MM, 0.0)
+
+        def place(x: np.ndarray, _: int, y: Callable[[np.ndarray], np.ndarray] = height) -> np.ndarray:
+            return np.stack([x, y(x), 0.0 * x], axis=1)
+
+        chosen = curves(place, lambda x, _: np.tile([1.0, 0.0, 0.0], (len(x), 1)), [-10.0 * MM], [0.05 * MM],
+                        [[-30.0 * MM, 38.0 * MM]], count=561)  # fmt: skip
+        together = []
+        for each_turn in (False, True):
+            points, _ = closest_points(chosen, parameter, *words, 0.0, 2, each_turn=each_turn)
+            drawn = rounded(points[0], words[0][0])
+            off, before = np.abs(drawn[:, 1] - height(drawn[:, 0])), drawn[:, 0] < 4.0 * MM
+            together.append(off[before].max() + off[~before].max())
+        shares.append(together[1] / together[0])
+    assert max(shares) < 1.05
+    assert min(shares) < 0.6
 
 
 @pytest.mark.parametrize("slope", [0.9, -0.4])

@@ -43,6 +43,21 @@ def test_a_post_is_printed_or_put_where_it_belongs(compensate, tmp_path):
         assert (tmp_path / file).read_bytes() == content
 
 
+def test_an_edited_post_is_replaced_where_it_is_asked_for_alone(compensate, tmp_path):
+    for system, file in POSTS.items():
+        content, target = post_file(system).read_bytes(), tmp_path / file
+        edited = content + b"# mine\n"
+        target.write_bytes(edited)
+        done = compensate("posts", system, "-o", tmp_path)
+        assert done.code == 1
+        assert "FIL017" in done.err
+        assert target.read_bytes() == edited
+        assert compensate("posts", system, "-o", tmp_path, "--replace").code == 0
+        assert target.read_bytes() == content
+        assert compensate("posts", system, "-o", tmp_path).code == 0
+    assert compensate("posts", "freecad", "--replace").code == 2
+
+
 def test_no_folder_is_made_for_a_post(compensate, tmp_path):
     done = compensate("posts", "freecad", "-o", tmp_path / "macros")
     assert done.code == 2

@@ -158,6 +158,7 @@ def test_a_correction_begins_anew_where_the_force_jumps_in_any_component(scale, 
     # with another tool as well
     path = job.toolpath.with_columns(tool=np.arange(9) % 2)
     assert replace(forced, toolpath=path).steps(rows, np.ones(9, bool)).all()
+    assert replace(forced, toolpath=path).steps(rows, np.zeros(9, bool)).all()
 
 
 def test_a_correction_goes_on_along_the_joints_of_the_track():

@@ -105,6 +105,16 @@ def test_points_beside_each_turn_come_as_near_as_a_search_in_the_plane(slope: fl
     assert drawn_error(points, slope, 0.5 * MM) == pytest.approx(found.largest, rel=0.03)
 
 
+def test_points_of_another_ramp_are_kept_where_none_come_nearer() -> None:
+    curve, fits = bent(0.885), CloseFits()
+    start = fits.fit(ramp_along(curve), curve, 0, 0.0)
+    assert start is not None
+    found = fits.go_on(ramp_along(curve), curve, start, 0.0)
+    assert found.largest <= start.largest
+    nearer = replace(start, largest=0.5 * found.largest)
+    assert fits.go_on(ramp_along(curve), curve, nearer, 0.0) is nearer
+
+
 @pytest.mark.parametrize("turn", [0, 1])
 def test_one_turn_alone_leaves_the_other_as_far_as_it_may_be(turn: int) -> None:
     curve = bent(0.885)

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from judge.cases import steps_of_force
 from path_cases import corner, line
+from spring_cases import MM, spring
 
 from postproc.compensation.ramped_forces import STEEPEST, add_force_ramps, correction_steps
 from postproc.process import Wrenches
 from postproc.process.force_ramps import Ramps
+from postproc.toolpath import Kind
 from postproc.workflows.preparation import Request, prepare
 
 
@@ -186,3 +188,17 @@ def test_how_long_a_ramp_is(tmp_path, feed, cell, length):
     (tmp_path / "cell.yaml").write_text(stated + cell)
     ramps = prepare(Request(tmp_path / "part.src", force="")).task.force.ramps
     np.testing.assert_allclose(ramps.steps()[1], length * 1e-3)
+
+
+@pytest.mark.parametrize("kind", [Kind.LIN, Kind.SPL, Kind.PTP])
+def test_a_step_goes_over_on_a_path_that_is_known_alone(kind):
+    """On the way to a point of a spline, or with PTP, the force steps as it is stated."""
+    points = np.array([[0, 0, 20], [0, 0, 0], [100, 0, 0], [100, 100, 0]]) * MM
+    force = np.array([[0, 0, 0], [0, 0, 0], [100, 0, 0], [0, 300, 0]])
+    kinds = [Kind.PTP, Kind.LIN, Kind.LIN, kind]
+    job = spring(points, [False, False, True, True], 1e-6 * np.eye(3), force, kind=kinds)
+    job = replace(job, force=replace(job.force, steps=np.arange(4) == 3))
+    found = add_force_ramps(job, 5 * MM).force
+    at = found.along(np.array([3, 3]), np.array([0.0, 1.0]))[:, :3]
+    np.testing.assert_allclose(at, force[[2, 3]] if kind == Kind.LIN else force[[3, 3]], atol=1e-9)
+    assert found.steps.tolist() == [False, False, False, kind != Kind.LIN]

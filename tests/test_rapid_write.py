@@ -72,6 +72,11 @@ def test_only_the_numbers_that_change_are_edited() -> None:
     assert f"MoveL {target('1.010', '+2', '-3')},v100,z1,t; ! MoveL 1.00\n" in text
 
 
+def test_a_number_in_hexadecimal_digits_is_written_as_a_decimal() -> None:
+    program = module(f"MoveL {target('-0x10', '+2', '-3')},v100,z1,t;\n")
+    assert "MoveL [[-15.990,2,-3],[0,0,1,0]," in written(program, plan_of(program, {0: (0.01, 0, 0)}))
+
+
 def test_a_number_keeps_its_decimals_and_a_shift_below_half_of_the_last_one_is_none() -> None:
     program = module(f"MoveL {target('1.00000', '2', '3')},v100,z1,t;\n")
     assert "[[1.00001,2,3]" in written(program, plan_of(program, {0: (0.00001, 0.0004, 0)}))

@@ -563,6 +563,12 @@ ERRORS = {
     "unknown sign": ("sign: energy", "sign: printed", "YML004", "did you mean 'as_printed'"),
     "unknown preload": ("preload: balanced", "preload: balance", "YML004", "did you mean 'balanced'"),
     "zero that is no angle": ("zero_deg: 0", "zero_deg: 500", "YML004", "not within -360 .. 360"),
+    "interval of two kinds": (
+        "0.115e-6, ci_level: unstated",
+        "0.1e-6, ci95: 0.1e-6",
+        "YML004",
+        "stated twice",
+    ),
     "level of an interval": (
         "0.115e-6, ci_level: unstated",
         "0.115e-6, ci_level: high",

@@ -621,6 +621,27 @@ def test_mesh_in_its_place_is_no_mistake(tmp_path):
     assert len(load_robot(write(tmp_path, BY_URDF, text)).joints) == 6
 
 
+@pytest.mark.parametrize(
+    "part",
+    [
+        '<joint name="c" type="floating"><parent link="l1"/><child link="cam"/></joint>',
+        '<joint name="c" type="fixed"><parent link="l1"/><child link="cam"/><axis xyz="0 0 0"/></joint>',
+    ],
+)
+def test_joints_that_do_not_turn_the_arm_may_be_of_any_kind(tmp_path, part):
+    text = BY_URDF.replace("{file: arm.urdf}", "{file: arm.urdf, tip: tool0}")
+    arm = load_robot(write(tmp_path, text, URDF.replace("</robot>", f'<link name="cam"/>{part}</robot>')))
+    assert len(arm.joints) == 6
+
+
+def test_the_file_that_the_readme_shows_is_read(tmp_path):
+    readme = (Path(__file__).parents[1] / "robots" / "README.md").read_text(encoding="utf-8")
+    text = readme.split("```yaml\n", 1)[1].split("```", 1)[0]
+    (term,) = StiffnessModel.from_robot(load_robot(write(tmp_path, text))).terms
+    assert term.values["c1"] == pytest.approx(3.774e-6, rel=1e-12)
+    assert term.values["c2"] == pytest.approx(0.302e-6, rel=1e-12)
+
+
 def test_urdf_stays_in_its_folder(tmp_path):
     folder = tmp_path / "robots"
     folder.mkdir()

@@ -95,8 +95,8 @@ def test_of_a_motion_from_an_unknown_place_no_side_is_known():
     unknown = replace(job, lost_motion=replace(lost, programmed=programmed, restart=restart, **parts))
     motions = np.flatnonzero((division.source == 3) & ~division.transitions)
     found = sides_of_output(unknown, replace(division)).at(motions, np.full(len(motions), 0.7))
-    assert (found[3:-3, 0] == 0).all()
-    assert len(found) > 20
+    assert len(found) == 3
+    assert (found[:-1, 0] == 0).all()
     known = np.flatnonzero(division.source == 2)[1:-3]
     one, two = (sides_of_output(j, replace(division)).at(known, np.ones(len(known))) for j in (job, unknown))
     np.testing.assert_allclose(one[:, 0], two[:, 0], atol=1e-6)

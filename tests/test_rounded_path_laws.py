@@ -189,6 +189,15 @@ def test_a_place_is_found_from_the_motions_beside_it():
     np.testing.assert_allclose(np.linalg.norm(free.shift, axis=1), [0.03 * MM, 0.0], atol=1e-9)
 
 
+def test_where_a_program_ends_in_its_cut_it_is_no_error_to_be_ahead():
+    job = spring(LINE, [False, True, True, True], approximation=np.full(4, 1.0 * MM))
+    shifts = np.zeros((4, 3))
+    shifts[3, 0] = 0.03 * MM
+    ended = RoundedOutput(job, output(job, shifts), np.arange(4))
+    found = ended.deviations(ended.place(np.array([3])), np.ones(1))
+    np.testing.assert_allclose(found.shift, 0.0, atol=1e-9)
+
+
 LINE = np.array([[-60, 0, 0], [-50, 0, 0], [0, 0, 0], [100, 0, 0]]) * MM
 
 

@@ -86,6 +86,13 @@ def test_a_feed_that_is_not_f_is_not_known(word: str) -> None:
         assert np.isfinite(path.feed[-1]) == known
 
 
+def test_nothing_is_inserted_before_a_block_with_a_feed_of_its_own() -> None:
+    """FB holds in its block alone, and what is inserted would run at the feed of the blocks before."""
+    raw = b"G90 G17 G54 G71 G94 T1 D1\nG1 X0 Y0 Z5 F100\nG1 X9 FB=30\nG1 X20\nM30\n"
+    path = SINUMERIK.read((Document(Path("part.mpf"), raw),), DOWN).toolpath
+    assert list(path.constraints.no_insert_before) == [1]
+
+
 @pytest.mark.parametrize(
     "name", ["$P_PFRAME", "$P_BFRAME", "$P_CHBFRAME[0]", "$P_ACTFRAME", "$P_UBFR", "$p_pframe"]
 )

@@ -17,6 +17,7 @@ from postproc.process.stock.bounds import (
 )
 from postproc.process.stock.cell_lists import build_stock
 from postproc.process.stock.cells import stock_distance
+from postproc.process.stock.displaced import displaced_rows
 from postproc.process.stock.distance import pose_distance
 
 
@@ -61,8 +62,21 @@ def test_what_is_far_by_its_bound_is_far(cutter, five):
     assert tight < 0.5 * seen
 
 
+def displaced_by(rng, slack, rows):
+    """The sweeps ``rows`` with ends that are shifted and turned so that no point of the cutter moves by more than
+    ``slack`` [m]."""
+    first, last = rng.normal(0, 1, (2, len(rows), 6))
+    far = BALL.numbers[2]
+    for end in (first, last):
+        end[:, 3:] /= far
+        size = np.linalg.norm(end[:, :3], axis=1) + far * np.linalg.norm(end[:, 3:], axis=1)
+        end *= (slack * rng.uniform(0.5, 1, len(rows)) / size)[:, None]
+    return displaced_rows(rows, np.broadcast_to([0.0, 1.0], (len(rows), 2)), first, last, far)
+
+
+@pytest.mark.parametrize("slack", [0.0, 0.3e-3])
 @pytest.mark.parametrize("five", [False, True])
-def test_a_plane_is_a_lower_bound_in_all_of_its_cell(five):
+def test_a_plane_is_a_lower_bound_in_all_of_its_cell(five, slack):
     cutters, half = np.array([BALL.numbers]), 0.6e-3
     bounded, close = 0, 0
     for seed in range(6):
@@ -70,23 +84,24 @@ def test_a_plane_is_a_lower_bound_in_all_of_its_cell(five):
         rows = np.ascontiguousarray(sweeps_of(path, block([0, 0, -40], [100, 60, 0]), BALL)[0].rows)
         bounds, plane = np.zeros((len(rows), BOUND_COLUMNS)), np.zeros(PLANE_COLUMNS, np.float32)
         rng = np.random.default_rng(200 + seed)
+        moved = displaced_by(rng, slack, rows) if slack else rows
         for j in range(len(rows)):
             set_bound(rows, cutters, j, bounds[j])
             for _ in range(6):
                 tip = rows[j, :3] + rng.uniform() * rows[j, 3:6]
                 middle = tip + rng.normal(0, 0.003, 3) + rng.uniform(-0.001, 0.006) * rows[j, 6:9]
-                set_plane(bounds, cutters, j, *middle, half, plane)
+                set_plane(bounds, cutters, j, tuple(middle), half, slack, plane)
                 off = rng.normal(0, 1, 3)
                 off *= half * rng.uniform() ** (1 / 3) / np.linalg.norm(off)
                 x, y, z = middle + off
                 least = min(
-                    pose_distance(rows, cutters, j, share, x, y, z) for share in np.linspace(0, 1, 401)
+                    pose_distance(moved, cutters, j, share, x, y, z) for share in np.linspace(0, 1, 401)
                 )
                 bound = plane[0] + plane[1:] @ off
                 if plane[0] > -0.1:
                     bounded += 1
                     assert bound < max(least, 0.0)
-                    close += least < 0.0 or bound > least - 0.15e-3
+                    close += least < 0.0 or bound > least - 0.15e-3 - 2 * slack
     assert bounded > 100
     assert close > 0.7 * bounded
 

@@ -210,3 +210,21 @@ def test_a_first_level_that_is_deeper_than_the_next_ones_is_reported(folder, lev
         assert code == 3
         (one,) = found["STK033"]
         assert "cuts 4 mm deep in its first level (line 5), and goes 2 mm deeper in each" in one["message"]
+
+
+@pytest.mark.parametrize(
+    ("cylinder", "levels", "code"),
+    [
+        ("center: [50, 30, -15], diameter: 150, height: 30", (-2, -4, -6, -8), "STK033"),
+        ("center: [50, 30, -30], diameter: 60, height: 100, axis: x", (-5,), "STK032"),
+        ("center: [50, 30, -30], diameter: 150, height: 30", (-2, -4, -6, -8), None),
+        ("center: [0, 30, -30], diameter: 60, height: 100, axis: x", (-5,), None),
+    ],
+)
+def test_a_cylinder_by_the_middle_of_its_height_is_reported(folder, cylinder, levels, code):
+    """It is stated by the middle of its foot: read so, it lies half of its height too far along its axis."""
+    exit, found = engaged(folder, rows_of(levels), f"stock: {{cylinder: {{{cylinder}}}}}\n" + tool())
+    assert set(found) & {"STK008", "STK032", "STK033"} == ({code} if code else set())
+    if code:
+        assert exit == 3
+        assert "center is the middle of a cylinder's foot" in found[code][0]["help"]

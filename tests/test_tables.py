@@ -70,6 +70,46 @@ def test_separators_quotes_and_decimal_commas(tmp_path, text):
     assert "fy" not in table
 
 
+@pytest.mark.parametrize(
+    ("text", "line", "column", "cell", "comma"),
+    [
+        ("line;fx;fy\n6;-170,5;1.000\n7;-170,5;355,2\n", 2, "fy", "'1.000'", "'-170,5' in line 2"),
+        ("line;fx\n1;2\n2;1.5\n3;0,5\n", 3, "fx", "'1.5'", "'0,5' in line 4"),
+        ("line\tfx\n1\t-1.5e2\n2\t0,5\n", 2, "fx", "'-1.5e2'", "'0,5' in line 3"),
+        ('line;fx\n1;"1.000"\n2;"0,5"\n', 2, "fx", "'1.000'", "'0,5' in line 3"),
+        ("line;fx;name\n1;2.5;x\n2;3;\u00fc\n3;0,5;\u00fc\n", 2, "fx", "'2.5'", "'0,5' in line 4"),
+        ("line;fx;name\n1;0,5;x\n2;2.5;\u00fc\n", 3, "fx", "'2.5'", "'0,5' in line 2"),
+        ("line;fx;fy\n" + "1;2;3\n" * 40000 + "1;2;.5\n1;2,5;3\n", 40002, "fy", "'.5'", "in line 40003"),
+    ],
+)
+def test_a_point_beside_decimal_commas_is_refused(tmp_path, text, line, column, cell, comma):
+    """1.000 is one or a thousand: the file that has commas elsewhere does not say which."""
+    finding = refused(write(tmp_path, text), "line", "fx", *(["fy"] if "fy" in text else []))
+    assert finding.line == line
+    assert (
+        f"column {column}: {cell} has a point, and the decimals of this file are after a comma"
+        in finding.message
+    )
+    assert comma in finding.message
+    assert "1000, not 1.000" in finding.help
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("line;fx;fy\n6;-170.5;1.000\n7;2;355.2\n", [-170.5, 2.0]),
+        ("# spring 0,5 N\nline;fx\n1;1.5\n", [1.5]),
+        ("# spring 0.5 N\nline;fx\n1;1,5\n", [1.5]),
+        ("line;name;fx\n1;left, 2.0;1.5\n", [1.5]),
+        ("line;name;fx\n1;wall 2.0;1,5\n2;p.src;2\n", [1.5, 2.0]),
+        ('line,name,fx\n1,"2,5",1.5\n', [1.5]),
+        ("line;fx\n1;1e3\n2;2,5e1\n", [1000.0, 25.0]),
+    ],
+)
+def test_decimals_of_one_kind_are_read(tmp_path, text, values):
+    assert read_table(write(tmp_path, text), "FRC003").numbers("fx").tolist() == values
+
+
 def test_blank_and_comment_lines_are_skipped_and_counted(tmp_path):
     table = read_table(write(tmp_path, "# robot: kr\n\nline,fx\n1,2\n  # note\n,,\n;;\n 5 , 6 \n"), "FRC003")
     assert table.lines.tolist() == [4, 8]
@@ -295,13 +335,17 @@ def test_many_lines_are_read_as_one_by_one(tmp_path_factory, rows, separator, en
         return
     table = read_table(path, "FRC003")
     assert table.lines.tolist() == expected[0]
+    rows = [[cell[1:] if re.match("'+[=+@-]", cell) else cell for cell in row] for row in expected[1]]
+    commas = any("," in cell and NUMBER.fullmatch(cell.replace(",", ".", 1)) for row in rows for cell in row)
     for column, name in enumerate("abc"):
-        cells = [row[column] for row in expected[1]]
-        shown = [cell[1:] if re.match("'+[=+@-]", cell) else cell for cell in cells]
+        shown = [row[column] for row in rows]
         assert table.texts(name) == shown
-        assert [table.columns[name][row] for row in range(len(cells))] == shown
+        assert [table.columns[name][row] for row in range(len(shown))] == shown
         numbers = [number_of(cell, separator) for cell in shown]
-        if None in numbers:
+        pointed = [row for row, cell in enumerate(shown) if "." in cell and NUMBER.fullmatch(cell)]
+        if commas and separator != "," and pointed:
+            assert refused(path, name).line == expected[0][pointed[0]]
+        elif None in numbers:
             assert refused(path, name).line == expected[0][numbers.index(None)]
         else:
             assert table.numbers(name).tobytes() == np.array(numbers).tobytes()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from path_cases import circle, line
+from path_cases import circle, line, task
 
 from postproc.compensation.tool_displacement import ToolDisplacement
 from postproc.process.operation_names import OperationNames
@@ -61,3 +61,68 @@ def test_where_the_feed_is_along_the_spindle_no_wall_is_beside_it():
     tool = np.ones(n, np.int64)
     shift = ToolDisplacement(job.desired_path, spindle, tool, names, radius={1: 1e-3}, side={(1, "ROUGH"): 1})
     assert np.abs(shift.at(rows, job.wanted[rows])).max() == 0.0
+
+
+def around(points, cutting, sides, radius=3e-4, cuts=True):
+    """A path of straight motions with a tool that points down, whose walls are on the ``sides`` of its motions."""
+    job = task(points, cutting, wrench=np.zeros(6))
+    n = len(job.toolpath)
+    names = OperationNames(("LEFT", "NONE", "RIGHT"), np.array(sides) + 1)
+    known = {(1, "LEFT"): -1, (1, "RIGHT"): 1}
+    spindle, tool = np.tile(TIP_WARD, (n, 1)), np.ones(n, np.int64)
+    limits = {"radius": {1: radius}, "side": known}
+    return job, ToolDisplacement(
+        job.desired_path, spindle, tool, names, **limits, cuts=np.array(cutting) if cuts else None
+    )
+
+
+def shifted(job, shift, row, share):
+    rows, along = np.full(len(share), row), np.asarray(share, float)
+    poses = job.desired_path.at(rows, along)
+    return poses.position, shift.at(rows, poses, along)
+
+
+@pytest.mark.parametrize("angle", [-110, -90, -30, 1e-6, 45, 90, 118])
+@pytest.mark.parametrize("side", [1, -1])
+def test_parallels_of_two_walls_meet_in_one_vertex(angle, side):
+    """Of an inner and of an outer corner: the displaced motions are parallel to the walls at the radius, and share
+    their vertex, which is where the two parallels cross."""
+    turn = np.radians(angle)
+    corner = np.array([1.6, 0.0, 0.5])
+    ways = np.array([[0.0, 1.0, 0.0], [-np.sin(turn), np.cos(turn), 0.0]])
+    points = [corner - 0.1 * ways[0] + [0, 0, 0.1], corner - 0.1 * ways[0], corner, corner + 0.1 * ways[1]]
+    job, shift = around(points, [False, False, True, True], [side] * 4)
+    right = [np.cross([0, 0, -1.0], way) for way in ways]
+    for row, way, normal in zip((2, 3), ways, right, strict=True):
+        place, moved = shifted(job, shift, row, np.linspace(0, 1, 7))
+        np.testing.assert_allclose(moved @ normal, side * 3e-4, atol=1e-9)
+        np.testing.assert_allclose(moved[:, 2], 0.0, atol=1e-9)
+        line = place + moved
+        np.testing.assert_allclose(np.cross(line - line[:1], way), 0.0, atol=1e-9)
+    ends = [shifted(job, shift, row, [share])[1][0] for row, share in ((2, 1.0), (3, 0.0))]
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
+    other = around(points, [False, False, True, True], [side] * 4, cuts=False)[1]
+    apart = shifted(job, other, 2, [1.0])[1] - shifted(job, other, 3, [0.0])[1]
+    assert np.linalg.norm(apart) == pytest.approx(6e-4 * abs(np.sin(turn / 2)), abs=1e-9)
+
+
+def test_a_plunge_and_a_retract_go_beside_the_wall_that_they_belong_to():
+    points = [[1.6, -0.1, 0.6], [1.6, -0.1, 0.55], [1.6, -0.1, 0.5], [1.6, 0.1, 0.5], [1.6, 0.1, 0.55]]
+    job, shift = around(points, [False, False, True, True, True], [1] * 5)
+    right = np.cross([0, 0, -1.0], [0, 1.0, 0])
+    for row in (2, 3, 4):
+        _, moved = shifted(job, shift, row, np.linspace(0, 1, 5))
+        np.testing.assert_allclose(moved, np.tile(3e-4 * right, (5, 1)), atol=1e-9)
+
+
+@pytest.mark.parametrize("angle", [150, 180])
+def test_walls_of_a_sharp_corner_and_without_a_side_have_no_common_vertex(angle):
+    turn = np.radians(angle)
+    corner = np.array([1.6, 0.0, 0.5])
+    way = np.array([-np.sin(turn), np.cos(turn), 0.0])
+    points = [[1.6, -0.1, 0.6], [1.6, -0.1, 0.5], corner, corner + 0.1 * way]
+    for sides in ([1, 1, 1, 1], [1, 1, 1, 0]):
+        job, shift = around(points, [False, False, True, True], sides)
+        _, moved = shifted(job, shift, 2, np.linspace(0, 1, 4))
+        np.testing.assert_allclose(moved, np.tile([3e-4, 0.0, 0.0], (4, 1)), atol=1e-9)
+    assert not shifted(job, shift, 3, [0.0, 0.5])[1].any()

@@ -75,8 +75,24 @@ def test_the_goal_lies_off_the_wall_and_above_the_floor(tmp_path):
     floor_b = where[:, 0] > 0.31
     assert wall_a.sum() > 5
     assert floor_b.sum() > 5
-    np.testing.assert_allclose(in_base[wall_a], np.tile([0, 0.03, 0.05], (wall_a.sum(), 1)), atol=1e-9)
-    np.testing.assert_allclose(in_base[floor_b], np.tile([0, -0.03, 0.05], (floor_b.sum(), 1)), atol=1e-9)
+    # along the feed it goes to where it is off the next wall as well
+    off_a, off_b = in_base[wall_a, 1:], in_base[floor_b, 1:]
+    np.testing.assert_allclose(off_a, np.tile([0.03, 0.05], (wall_a.sum(), 1)), atol=1e-9)
+    np.testing.assert_allclose(off_b, np.tile([-0.03, 0.05], (floor_b.sum(), 1)), atol=1e-9)
+
+
+def test_an_operation_may_cut_no_wall(tmp_path):
+    """It is stated, so nothing is reported, and its floor is where it is without a radius."""
+    walls = 'walls: {"wall a": right, "wall b": left, "floor a": none, "floor b": none}'
+    ready = prepare(Request(with_errors(tmp_path, f"radius: 0.03, {walls}"), force=""))
+    assert "CEL013" not in [one.code for one in ready.findings]
+    task = ready.task
+    rows = np.flatnonzero(task.carries)
+    floor = rows[
+        task.known_error.operations.which[rows] == task.known_error.operations.names.index("FLOOR A")
+    ]
+    size = np.linalg.norm(task.known_error.at(floor, task.wanted[floor]), axis=1)
+    assert np.count_nonzero(size > 1e-9) <= 2  # where it meets a wall
 
 
 def test_walls_on_no_side_are_reported_and_not_corrected(tmp_path):
@@ -88,7 +104,7 @@ def test_walls_on_no_side_are_reported_and_not_corrected(tmp_path):
     rows = np.flatnonzero(ready.task.carries)
     moved = ready.task.known_error.at(rows, ready.task.wanted[rows])
     size = np.linalg.norm(moved, axis=1)
-    assert set(np.round(size, 9)) == {0.0, 3e-5}
+    assert set(np.round(size, 9)) == {0.0, 3e-5, np.round(3e-5 * 2**0.5, 9)}  # in corners off both walls
 
 
 @pytest.mark.slow

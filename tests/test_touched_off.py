@@ -326,6 +326,15 @@ def test_what_the_process_leaves_is_named(compensate, job):
     assert told(compensate, job, effects="") == {}
 
 
+def test_lost_motion_by_direction_is_corrected_and_not_named(compensate, job):
+    loop = "  - effect: hysteresis\n    parameters:\n      w1: {value: 1e-3, unit: rad, source: test}\n"
+    assert told(compensate, job, effects=loop) == {}
+    gap = loop.replace("hysteresis", "backlash").replace("w1", "b1")
+    words = "the side of a gap that weights choose (backlash)"
+    said = f"correct: process does not correct errors of the robot without force: {words}"
+    assert told(compensate, job, effects=gap) == {"COR030": [said]}
+
+
 @pytest.mark.slow
 def test_what_is_left_to_the_controller_is_named(compensate, job):
     mode = ["correct: absolute", "temperature: 24"]
@@ -376,12 +385,12 @@ def test_weights_that_the_controller_carries_are_not_corrected(compensate, job):
 
 
 def test_identified_growth_states_its_reference(tmp_path):
-    """A file that is written from warm readings states the temperature from which growth counts."""
+    """A file that is written from warm readings states the temperature from which their growth counts."""
     robot = heavy_robot(tmp_path)
     by_temperature, by_time = (
         EffectInstance(ThermalGrowth(robot.joints, word), {}, {}) for word in ("temperature", "time")
     )
-    warm, unknown = SimpleNamespace(temperature=np.array([21.5, 30.0])), SimpleNamespace(temperature=None)
+    warm, unknown = SimpleNamespace(calibrated_at=21.5), SimpleNamespace(calibrated_at=None)
     assert effect_options(by_temperature, warm) == {"variable": "temperature", "reference": 21.5}
     assert effect_options(by_temperature, unknown) == {"variable": "temperature"}
     assert effect_options(by_time, warm) == {"variable": "time"}

@@ -14,17 +14,17 @@ from postproc.toolpath import Toolpath
 
 POINT = """P[{}]{{
    GP1:
-\tUF : 1, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',
+\tUF : 1, UT : 1,\t\tCONFIG : '{}',
 \tX = {}.000  mm,\tY = 0.000  mm,\tZ = 0.000  mm,
 \tW = 180.000 deg,\tP = 0.000 deg,\tR = 0.000 deg
 }};
 """
 
 
-def program(*lines: str) -> Program:
+def program(*lines: str, config: str = "N U T, 0, 0, 0") -> Program:
     body = ["UFRAME_NUM=1", "UTOOL_NUM=1", *lines]
     text = "".join(f"{n:4d}:  {line} ;\n" for n, line in enumerate(body, 1))
-    points = "".join(POINT.format(n, 10 * n) for n in range(1, 6))
+    points = "".join(POINT.format(n, config, 10 * n) for n in range(1, 6))
     raw = f"/PROG PART\n/ATTR\n/MN\n{text}/POS\n{points}/END\n".encode()
     return DIALECTS["tp"].read((Document(Path("part.ls"), raw),))
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from path_cases import task
 from scipy.spatial.transform import Rotation
 
+from postproc.compensation import unknown_distance
 from postproc.compensation.approximations import with_distance
 from postproc.compensation.corner_fit import fit_corners
 from postproc.compensation.corners import compare_corners, compare_corners_at
@@ -60,6 +62,32 @@ def test_up_to_the_distance_that_is_found_all_corners_hold_the_tolerance_and_bey
     for factor, holds in ((1.0, True), (1.1, False)):
         other = compare_corners_at(*with_distance(job, division, factor * found), corners.motion)
         assert bool((other.difference <= job.tolerance).all()) == holds
+
+
+@pytest.mark.parametrize("many", [3, 200])
+def test_the_largest_distance_is_the_one_with_which_the_worst_corner_has_the_tolerance(
+    many: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of corners that are off by their own share of the distance, plus what one of them is off by from 1 mm on."""
+    job = square(np.nan)
+    division = subdivide(job, correct(job), FREE)
+    share = np.random.default_rng(many).uniform(0.001, 0.01, many)
+    late = np.where(np.arange(many) == 1, 1.0, 0.0)
+    distance = np.full(many, 50e-3)
+
+    def compared(words: float, motion: np.ndarray) -> SimpleNamespace:
+        return SimpleNamespace(difference=words * share[motion] + late[motion] * max(words - 1e-3, 0.0))
+
+    monkeypatch.setattr(unknown_distance, "with_distance", lambda task, division, distance: (distance,))
+    monkeypatch.setattr(unknown_distance, "compare_corners_at", compared)
+    corners = SimpleNamespace(motion=np.arange(many), unknown=np.ones(many, bool), distance=distance)
+    exact = min(job.tolerance / share.max(), (job.tolerance + 1e-3) / (share[1] + 1.0))
+    found = largest_distance(job, division, corners)  # type: ignore[arg-type]
+    assert 0.9 * exact < found <= exact
+    late[:], share[:] = 0.0, 1e-5
+    assert largest_distance(job, division, corners) == 50e-3  # type: ignore[arg-type]
+    share[many - 1] = np.inf
+    assert largest_distance(job, division, corners) == 0.0  # type: ignore[arg-type]
 
 
 def test_nothing_is_fitted_to_a_distance_that_is_not_known() -> None:

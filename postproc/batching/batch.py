@@ -87,7 +87,12 @@ def run_batch(request: BatchRequest, watch: Watch | None = None) -> Batched:
     )
     skipped = tuple(str(path) for path in jobs.passed_over)
     batched = Batched(jobs.root, outcomes, (), skipped, time.monotonic() - start_time)
-    return batched if request.options.get("dry_run") else _published(batched, request.json)
+    if not request.options.get("dry_run"):
+        return _published(batched, request.json)
+    if request.json is not None:  # asked for by name
+        batched = replace(batched, outputs=(str(request.json),))
+        write_atomically({request.json: summary_json(batched)})
+    return batched
 
 
 def _published(batched: Batched, json: Path | None) -> Batched:

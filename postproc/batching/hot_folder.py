@@ -16,9 +16,9 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from postproc.base.findings import Refusal
+from postproc.base.findings import Finding, Refusal
 from postproc.batching.files_read import code_digest
-from postproc.batching.item import BatchItem, run_item
+from postproc.batching.item import BatchItem, failed, run_item
 from postproc.batching.job_file import FOLDER, OptionValues, jobs_of
 from postproc.batching.locking import locked
 from postproc.batching.programs import is_program
@@ -27,6 +27,7 @@ from postproc.cell import NAME as CELL
 from postproc.languages import COMPANION_SUFFIXES
 from postproc.output.atomic_write import write_atomically
 from postproc.report.batched import FAILED, Outcome
+from postproc.workflows.replaced_reports import program_of
 
 ARCHIVE, REFUSED = "done", "failed"
 """Folders, in the hot one, of the programs that were compensated and of those that could not be."""
@@ -118,7 +119,13 @@ class HotFolder:
             (job,) = jobs_of([str(program)], self.options, self.results).jobs
         except (Refusal, ValueError):
             return 0  # it is gone
-        outcome = run_item(BatchItem(job, code_digest()))
+        page = (job.request.report or job.target.parent) / f"{job.target.stem}.report.json"
+        if other := program_of(page, program, job.target):
+            message = f"{other} and {program.name} would be written to reports of the same name, {page.name}"
+            help = "rename one of the programs, or move the results of the other one to another folder"
+            outcome = failed(job, Finding("BAT002", message, str(program), help=help))
+        else:
+            outcome = run_item(BatchItem(job, code_digest()))
         if outcome.state == FAILED and (mistakes := [f for f in outcome.findings if f.code in MISTAKES]):
             raise Refusal(*mistakes)  # every program would fail by it, and be moved away
         if outcome.state == FAILED and any(finding.code in TRANSIENT for finding in outcome.findings):
@@ -130,15 +137,18 @@ class HotFolder:
         return 1
 
     def _move(self, program: Path, outcome: Outcome) -> None:
-        failed = outcome.state == FAILED
-        place = self.folder / (REFUSED if failed else ARCHIVE)
-        group = self._group(program)
+        lost = outcome.state == FAILED
+        place = self.folder / (REFUSED if lost else ARCHIVE)
+        # what another program waits for stays
+        others = [path for path in self._programs() if path != program]
+        needed = {member for path in others for member in self._group(path)}
+        group = [one for one in self._group(program) if one == program or one not in needed]
         number = 1
         while any(_numbered(place, member, number).exists() for member in group):
             number += 1
         moves = {str(member): str(_numbered(place, member, number)) for member in group}
         report = {}
-        if failed:
+        if lost:
             why = _numbered(place, program.with_suffix(".report.json"), number)
             report[why] = (json.dumps(outcome.result, indent=2) + "\n").encode()
         write_atomically({**report, self._journal: (json.dumps(moves) + "\n").encode()})

@@ -39,7 +39,7 @@ CODES = define(
             "side of a wall is not stated",
             meaning="tool_errors states the radius of a tool, and not on which side of the feed its walls lie.",
             consequence="The larger or smaller radius is not corrected in the operations that the message names.",
-            action="Add walls: {OPERATION: left} or right to the tool, seen along the spindle.",
+            action="Add walls: {OPERATION: left}, right, or none to the tool, seen along the spindle.",
             example="A cell that was learnt from one program, used for another with other operations.",
         ),
         "CEL005": Code(
@@ -49,6 +49,22 @@ CODES = define(
             consequence="The robot would be elsewhere, or carry another weight, than the prediction assumes.",
             action="Write lengths in mm, angles in deg and masses in kg.",
             example="`tools: {1: {x: 0.3, y: 0, z: 0.18}}` in metres.",
+        ),
+        "CEL015": Code(
+            "warning",
+            "operation of the cell is not in the program",
+            meaning="force_factors or tool_errors name an operation that no motion of the program belongs to.",
+            consequence="What is stated of it is not used, and an operation of a similar name is left without.",
+            action="Write the whole name, as the comment OPERATION or the process file has it.",
+            example="`SLOTT` or `OUTSIDE` where the program has `OUTSIDE CONTOUR ROUGHING`.",
+        ),
+        "CEL016": Code(
+            "info",
+            "operations of other programs",
+            meaning="force_factors or tool_errors name operations that this program does not have.",
+            consequence="What is stated of them is not used here.",
+            action="Nothing, where the cell is shared with other programs.",
+            example="A cell for roughing and finishing in two programs.",
         ),
         "CEL014": Code(
             "warning",

@@ -116,6 +116,7 @@ class Cell:
     force_vector: ForceVectorInterval | None = None
     force_ramp: float | None = None
     force_factors: Mapping[str, ForceFactor] = field(default_factory=dict)
+    force_factors_line: int = 0
     tool_errors: Mapping[int, ToolError] = field(default_factory=dict)
     tool_errors_line: int = 0
     touch_points: dict[int | None, Floats] = field(default_factory=dict)

@@ -28,7 +28,8 @@ class MotionFrames:
     base_in_robot (N): programmed base in the robot root; tool_in_flange (N): TCP; spindle_in_tool (N, 3): unit
     vector of the spindle, tip-ward, in tool axes.  NaN where unknown.  Read-only.  external: what external axes move;
     where they do, the robot root is that for all of them at zero, turning with the part.  diameters: of the cutters of
-    the cell's tools by their numbers [m], where stated.
+    the cell's tools by their numbers [m], where stated.  bases: the cell's by their numbers, poses (1,) in the robot
+    root; none where external axes carry some.
     """
 
     base_in_robot: Poses
@@ -36,6 +37,7 @@ class MotionFrames:
     spindle_in_tool: Floats
     external: External | None = None
     diameters: Mapping[int, float] = field(default_factory=dict)
+    bases: Mapping[int, Poses] = field(default_factory=dict)
 
 
 def frames_of(
@@ -69,6 +71,9 @@ def frames_of(
         _rows(np.array([*axes, np.full(3, np.nan)]), toolpath.tool),
         external,
         {number: tool.diameter for number, tool in cell.tools.items() if tool.diameter is not None},
+        {}
+        if external is not None
+        else {number: (robot_from_world @ pose)[None] for number, pose in cell.bases.items()},
     )
 
 

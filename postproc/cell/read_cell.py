@@ -170,6 +170,7 @@ def load_cell(path: Path) -> Cell:
         },
         force_vector=vector,
         force_factors=_force_factors(top),
+        force_factors_line=top.line_of("force_factors") if "force_factors" in top else 0,
         tool_errors={number: read_tool_error(section) for number, section in _numbered(top, "tool_errors")},
         tool_errors_line=top.line_of("tool_errors") if "tool_errors" in top else 0,
         force_ramp=_ramp(top),

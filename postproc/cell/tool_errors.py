@@ -11,7 +11,7 @@ from postproc.base.yaml_section import YamlSection
 OTHERS = "others"
 """Key of what holds for all operations that have no entry of their own."""
 
-WALL_SIDES = {"left": -1, "right": 1}
+WALL_SIDES = {"left": -1, "none": 0, "right": 1}
 """Where the wall lies that a tool cuts, seen along the spindle towards its tip in the sense of the feed."""
 
 LARGEST = 5.0
@@ -23,8 +23,8 @@ SIZES = ("radius", "length")
 @dataclass(frozen=True, eq=False)
 class ToolError:
     """``radius``, ``length`` [m] by which a tool is larger and longer; ``radius_ci95``, ``length_ci95`` [m]: half
-    widths of their 95 % intervals, None without; ``walls``: operation, in upper case, -> -1 (left) or 1 (right of the
-    feed); the radius acts only where that is known."""
+    widths of their 95 % intervals, None without; ``walls``: operation, in upper case, -> -1 (left), 1 (right of the
+    feed) or 0 (it cuts none); the radius acts only where there is one."""
 
     radius: float = 0.0
     length: float = 0.0
@@ -33,8 +33,12 @@ class ToolError:
     walls: Mapping[str, int] = field(default_factory=dict)
 
     def side(self, operation: str) -> int:
-        """-1, 1, or 0 where nothing is stated."""
+        """-1, 1, or 0 where there is no wall, or nothing is stated."""
         return self.walls.get(operation, self.walls.get(OTHERS, 0))
+
+    def states(self, operation: str) -> bool:
+        """Whether it is stated where the wall of an operation lies, or that it has none."""
+        return operation in self.walls or OTHERS in self.walls
 
 
 def read_tool_error(section: YamlSection) -> ToolError:

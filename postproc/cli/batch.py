@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     help="Folder of the results; it repeats the folder structure of the programs [compensated/ beside JOBS].",
 )
 @allow_compensated_option
-@click.option("--dry-run", is_flag=True, help="Do everything but write files.")
+@click.option("--dry-run", is_flag=True, help="Do everything but write files; a FILE of --json is written.")
 @click.option(
     "-j",
     "--workers",
@@ -151,7 +151,8 @@ def batch(
         with contextlib.suppress(OSError):  # the terminal may be gone; what is written is written
             show_batched(out.console(), done, verbose)
         if dry_run:
-            click.echo("this is a dry run: nothing is written")
+            but = "" if out.json_file is None else f" but {out.json_file}"
+            click.echo(f"this is a dry run: nothing is written{but}")
     raise SystemExit(done.exit)
 
 

@@ -21,8 +21,10 @@ FEWEST_DRAWS = 20
 """Fewer draws do not determine an interval."""
 
 
-def split_words(_context: click.Context, _option: click.Parameter, text: str) -> tuple[str, ...]:
-    """``a,b.c`` as its words.  Raises BadParameter for an empty word and for one that comes twice."""
+def split_words(_context: click.Context, _option: click.Parameter, texts: tuple[str, ...]) -> tuple[str, ...]:
+    """``a,b.c`` as its words, of all times that the option is given.  Raises BadParameter for an empty word and for one
+    that comes twice."""
+    text = ",".join(texts)
     words = tuple(word.strip() for word in text.split(","))
     if not all(words):
         raise click.BadParameter(f"{text[:40]!r} contains an empty name; write effect,effect.parameter")
@@ -47,6 +49,7 @@ def _none_or(least: int) -> Callable[[click.Context, click.Parameter, int | None
     "--effects",
     required=True,
     metavar="EFFECT[.PARAMETER],...",
+    multiple=True,
     callback=split_words,
     help="Effects to identify, or single parameters of them. An effect that the robot file does not have is added.",
 )

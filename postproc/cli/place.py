@@ -21,16 +21,19 @@ _Command = TypeVar("_Command", bound=Callable[..., Any])
 
 
 def _range(_context: click.Context, option: click.Parameter, text: str | None) -> Range | None:
-    """``a:b`` in mm or deg."""
+    """``a:b`` or one value, in mm or deg."""
     if text is None:
         return None
     words = text.split(":")
-    if len(words) != 2:
-        raise click.BadParameter(f"{text[:40]!r} is no range a:b; without the option it stays where it is")
-    angle = option.name in TURNS
-    low, high = (number(word.strip(), WHOLE_TURN if angle else FAR) for word in words)
+    if len(words) > 2:
+        raise click.BadParameter(f"{text[:40]!r} is neither one value nor a range a:b")
+    limit = WHOLE_TURN if option.name in TURNS else FAR
+    values = [number(word.strip(), limit) for word in words]
+    if len(values) == 1:
+        return values[0], values[0]
+    low, high = values
     if not low < high:
-        help = f"write {high:g}:{low:g}" if low > high else "without the option it stays as it is"
+        help = f"write {high:g}:{low:g}" if low > high else f"for one value write {low:g}"
         raise click.BadParameter(
             f"the range {text[:40]!r} has no width: {low:g} is not below {high:g}; {help}"
         )
@@ -43,7 +46,7 @@ def _range_option(name: str, about: str) -> Callable[[_Command], _Command]:
 
 @click.command("place")
 @click.argument("programs", nargs=-1, required=True, type=click.Path(path_type=Path))
-@_range_option("x", "Range of the base's origin in $WORLD, mm.")
+@_range_option("x", "Range or one value of the base's origin in $WORLD, mm.")
 @_range_option("y", "The same for y.")
 @_range_option("z", "The same for z.")
 @_range_option(

@@ -28,9 +28,9 @@ MOST = 200
 Range = tuple[float, float]
 
 
-def _loads(_context: click.Context, _option: click.Parameter, text: str | None) -> Numbers:
-    """``kg,kg``, none below zero."""
-    loads = tuple(number(word.strip(), FAR) for word in text.split(",")) if text else ()
+def _loads(_context: click.Context, _option: click.Parameter, texts: tuple[str, ...]) -> Numbers:
+    """``kg,kg``, of all times that the option is given; none below zero."""
+    loads = tuple(number(word.strip(), FAR) for text in texts if text for word in text.split(","))
     if any(load < 0 for load in loads):
         raise click.BadParameter("a weight cannot be below zero")
     return loads
@@ -49,6 +49,15 @@ def _targets(
             raise click.BadParameter(f"{name!r} occurs twice")
         places[name] = numbers((3,), "x,y,z")(context, option, place)
     return tuple(places.items())
+
+
+def _wishes(_context: click.Context, _option: click.Parameter, texts: tuple[str, ...]) -> tuple[str, ...]:
+    """``NAME=VALUE`` or ``VALUE``, each name once."""
+    names = [text.partition("=")[0].strip() if "=" in text else "" for text in texts]
+    for name in names:
+        if names.count(name) > 1:
+            raise click.BadParameter(f"{name!r} occurs twice" if name else "a value for all occurs twice")
+    return texts
 
 
 def _place(context: click.Context, option: click.Parameter, text: str | None) -> Numbers | None:
@@ -92,7 +101,7 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
     """Two different names."""
     if text is None:
         return None
-    words = split_words(context, option, text)
+    words = split_words(context, option, (text,))
     if len(words) != 2:
         raise click.BadParameter(f"{text[:40]!r} is not two effects: a,b")
     return words
@@ -104,6 +113,7 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
     "--effects",
     required=True,
     metavar="EFFECT[.PARAMETER],...",
+    multiple=True,
     callback=split_words,
     help="Effects to identify, or single parameters of them.",
 )
@@ -120,6 +130,7 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
 @click.option(
     "--loads",
     metavar="KG,KG",
+    multiple=True,
     callback=_loads,
     help="Loads that can be hung at the TCP; all of them at every pose [absolute: none].",
 )
@@ -167,6 +178,7 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
     "--wanted",
     metavar="[NAME=]VALUE",
     multiple=True,
+    callback=_wishes,
     help="Wanted half width of the 95 % interval: c2=1%, s0=20mm, or 2% for all [those of the robot file].",
 )
 @click.option(
@@ -191,10 +203,9 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
 @click.option(
     "--cone",
     type=Decimal(0.0, 180.0, min_open=True),
-    default=60.0,
-    show_default=True,
     metavar="DEG",
-    help="A reflector is visible within this angle of its axis, which points away from the flange's axis.",
+    help="A reflector is visible to --tracker within this angle of its axis, which points away from the flange's axis "
+    "[60].",
 )
 @click.option(
     "--box",
@@ -260,7 +271,7 @@ def plan(
     force: str | None,
     cell: Path | None,
     tracker: Numbers | None,
-    cone: float,
+    cone: float | None,
     box: tuple[Range, ...],
     limits: tuple[tuple[str, Range], ...],
     spacing: float,
@@ -290,8 +301,8 @@ def plan(
     Exit codes: 0 done; 3 done, but a requested parameter is not observable; 1 failed; 2 wrong command line.
     """
     from postproc.report.planned import show_plan
-    from postproc.workflows.plan import PlanRequest
     from postproc.workflows.plan import plan as run
+    from postproc.workflows.plan_setups import CONE, PlanRequest
 
     if criterion == "test" and test_program is None:
         raise click.BadParameter("needs a program: --test PROGRAM", param_hint="--criterion test")
@@ -300,6 +311,8 @@ def plan(
         raise click.BadParameter("belongs to a program: --test PROGRAM", param_hint=option)
     if rough_targets and not targets:
         raise click.BadParameter("needs --target NAME=x,y,z, at least roughly", param_hint="--rough-targets")
+    if cone is not None and tracker is None:
+        raise click.BadParameter("needs --tracker X,Y,Z, from where reflectors are seen", param_hint="--cone")
     if one_load and len(loads) < 2:
         raise click.BadParameter("needs several --loads to choose from", param_hint="--one-load")
     if discriminate is not None and (criterion or test_program or measured):
@@ -324,7 +337,7 @@ def plan(
         force=force or "",
         cell=cell,
         tracker_mm=tracker,
-        cone_deg=cone,
+        cone_deg=CONE if cone is None else cone,
         box_mm=box,
         limits=limits,
         spacing_deg=spacing,

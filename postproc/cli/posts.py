@@ -9,6 +9,14 @@ import click
 from postproc.posts import POSTS
 
 
+def _differs(file: Path, content: bytes) -> bool:
+    """Whether there is a file with another content, or one that cannot be read."""
+    try:
+        return file.is_file() and file.read_bytes() != content
+    except OSError:
+        return True
+
+
 @click.command()
 @click.argument("system", type=click.Choice(tuple(POSTS), case_sensitive=False), required=False)
 @click.option(
@@ -18,7 +26,12 @@ from postproc.posts import POSTS
     metavar="DIR",
     help="Write the file into this folder, instead of printing it.",
 )
-def posts(system: str | None, output: Path | None) -> None:
+@click.option(
+    "--replace",
+    is_flag=True,
+    help="Replace the file of this name that DIR has, with your edits in it [it is kept, and the command fails].",
+)
+def posts(system: str | None, output: Path | None, replace: bool) -> None:
     """List the post-processors for CAM systems, or print the file of SYSTEM.
 
     The file makes the CAM system post and compensate in one step; where that fails, no program is written. Its first
@@ -30,10 +43,13 @@ def posts(system: str | None, output: Path | None) -> None:
       compensate posts freecad -o ~/.local/share/FreeCAD/Macro
       compensate posts robodk -o C:/RoboDK/Posts
     """
+    from postproc.base.findings import Finding, Refusal
     from postproc.cli.common import Out
     from postproc.output.atomic_write import write_atomically
     from postproc.posts import post_file
 
+    if replace and output is None:
+        raise click.UsageError("--replace belongs to a folder: name it with -o DIR")
     if system is None:
         for name, file in POSTS.items():
             click.echo(f"{name:8} {file}")
@@ -49,5 +65,11 @@ def posts(system: str | None, output: Path | None) -> None:
                 f"the folder {str(output)!r} does not exist: name that of {system}'s posts"
             )
         target = output / POSTS[system]
+        if not replace and _differs(target, content):
+            message = (
+                "the folder has a file of this name that differs from the post: your edits would be lost"
+            )
+            help = "keep it, name another folder, or use --replace and repeat the edits"
+            raise Refusal(Finding("FIL017", message, str(target), help=help))
         write_atomically({target: content})
         click.echo(f"wrote {target}")

@@ -42,7 +42,7 @@ from postproc.workflows.option_names import SHARED_POINTS
     " searched there.",
 )
 @insertion_options
-@click.option("--dry-run", is_flag=True, help="Do everything but write files.")
+@click.option("--dry-run", is_flag=True, help="Do everything but write files; a FILE of --json is written.")
 @allow_compensated_option
 def program(
     program: Path,
@@ -134,5 +134,6 @@ def program(
         with contextlib.suppress(OSError):  # the terminal may be gone; what is written is written
             show(out.console(), done, verbose)
         if dry_run:
-            click.echo("this is a dry run: nothing is written", err=streamed)
+            but = "" if out.json_file is None else f" but {out.json_file}"
+            click.echo(f"this is a dry run: nothing is written{but}", err=streamed)
     raise SystemExit(done.exit)

@@ -48,8 +48,9 @@ def verify(
     """Simulate ORIGINAL and COMPENSATED along their paths as the controller interpolates them, and report the errors.
 
     Both files are read and sampled until twice as many samples no longer change the errors.  The force on the tool is
-    that at the nearest point of the original's path.  Other differences are reported: stops, backward motions, missing
-    points, frames, feeds, external axes, points in air.
+    that at the nearest point of the original's path.  Other differences are reported: statements and words of motions,
+    stops, backward motions, missing points, frames, feeds, external axes, points in air; and a mark whose digests are
+    not those of ORIGINAL and of the robot.
 
     \b
     Examples:

@@ -17,7 +17,7 @@ from postproc.diagnosis.sample import sample_of
 from postproc.diagnosis.search_result import Search
 from postproc.diagnosis.selection import basis_of, outside
 from postproc.diagnosis.verdict import AS_WELL, FORMLESS
-from postproc.identification.campaign import Campaign
+from postproc.identification.campaign import Campaign, sense_of
 from postproc.identification.joint_scatter import visits_of
 from postproc.model import StiffnessModel
 
@@ -56,7 +56,8 @@ def diagnose_sides(
     done = diagnose(unknown, model, stage)
     if may_explain(campaign, done):
         stage("trying sides of approach")
-        other = diagnose(campaign, model, goes_on=by_approach)
+        ordered = replace(readings, direction=sense_of(readings))
+        other = diagnose(Campaign(ordered, campaign.stated_tool), model, goes_on=by_approach)
         if _is_better(other, done):
             return other, (_finding(readings.where(0)[0], "they are taken from the order of the rows"),)
     if done.verdict.conditional or done.verdict.word in SOUND:

@@ -167,12 +167,12 @@ def keys_of(model: StiffnessModel, candidate: Candidate) -> dict[tuple[int, str]
 
 
 def term_of(model: StiffnessModel, candidate: Candidate) -> int | None:
-    return _term(model, candidate.name, candidate.effect.described())
+    return _term(model, candidate.name, candidate.effect.form())
 
 
 def _term(model: StiffnessModel, name: str, options: dict[str, object]) -> int | None:
     for index, term in enumerate(model.terms):
-        if (term.effect.name, term.effect.described()) == (name, options):
+        if (term.effect.name, term.effect.form()) == (name, options):
             return index
     return None
 

@@ -79,7 +79,7 @@ class Candidate:
     @property
     def key(self) -> tuple[str, str]:
         """The form of the effect, and its joint."""
-        return f"{self.name} {self.effect.described()}", self.joint or self.up_to_joint
+        return f"{self.name} {self.effect.form()}", self.joint or self.up_to_joint
 
     @property
     def name(self) -> str:
@@ -88,7 +88,7 @@ class Candidate:
     @property
     def label(self) -> str:
         """In words: effect, its options where they distinguish two forms, and joint."""
-        options, words = self.effect.described(), self.name
+        options, words = self.effect.form(), self.name
         if "harmonics" in options:
             words += f" (harmonic {str(options['harmonics']).strip('[]').replace('.0', '')})"
         if "variable" in options:

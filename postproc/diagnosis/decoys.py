@@ -187,15 +187,15 @@ class OtherWave(AlternativeForm, TransmissionError):
 
 
 class DriftingBase(AlternativeForm, Offset):
-    """Robot and tracker that move apart, by x, y, z [m/K, m/s] times the temperature over that of the start or the
-    time since then: a stand that creeps, a foundation that warms up."""
+    """Robot and tracker that move apart, by x, y, z [m/K, m/s] times the temperature over that of the first reading or
+    the time since then: a stand that creeps, a foundation that warms up.  ``start`` [K, s]: of the first reading."""
 
     name = "base_offset"
     family = "geometric"
     about = "a drift of the whole arm"
 
-    def __init__(self, joints: Sequence[Joint], variable: str = "time") -> None:
-        self.variable = variable
+    def __init__(self, joints: Sequence[Joint], variable: str = "time", start: float = 0.0) -> None:
+        self.variable, self.start = variable, start
         unit = "m/K" if variable == "temperature" else "m/s"
         self.coordinates = ("base.x", "base.y", "base.z")
         self.parameters = tuple(Parameter(axis, unit, 0.0, source="drift of a stand") for axis in "xyz")
@@ -209,7 +209,7 @@ class DriftingBase(AlternativeForm, Offset):
         amount = conditions.temperature if self.variable == "temperature" else conditions.time
         if amount is not None:
             rows = [chain.index[name] for name in self.coordinates]
-            offset[rows] += column(values, self.parameters) * amount
+            offset[rows] += column(values, self.parameters) * (amount - self.start)
 
 
 def decoys(model: StiffnessModel, campaign: Campaign, mine: Candidate) -> list[Candidate]:
@@ -230,7 +230,10 @@ def decoys(model: StiffnessModel, campaign: Campaign, mine: Candidate) -> list[C
     if mine.joint == EVERY:
         return []
     if mine.name == ThermalGrowth.name:
-        return [_decoy(model, q, DriftingBase(joints, str(mine.effect.described()["variable"])), "")]
+        variable = str(mine.effect.form()["variable"])
+        given = campaign.readings.warmth if variable == "temperature" else campaign.readings.elapsed
+        drift = DriftingBase(joints, variable, 0.0 if given is None else float(given[0]))
+        return [_decoy(model, q, drift, "")]
     joint = next((i for i, one in enumerate(joints) if one.name == mine.joint), None)
     if joint is None:
         return []

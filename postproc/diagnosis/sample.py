@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.base.arrays import Ints
-from postproc.identification.campaign import Campaign
-from postproc.model import approach
+from postproc.identification.campaign import Campaign, sense_of
 
 MANY, SEARCHED = 2000, 1500
 """More readings than the first are searched in so many of them."""
@@ -21,13 +20,13 @@ SEED = 20260102
 
 
 def sample_of(campaign: Campaign) -> Campaign:
-    """``campaign``, or of a large one whole poses at random, as many of each session, with the first reading (from
-    which temperature and time count) among them."""
+    """``campaign``, or of a large one whole poses at random, as many of each session, with the first reading among
+    them."""
     if len(campaign) <= MANY:
         return campaign
     readings = campaign.readings
-    if readings.direction is None:  # the order of the rows gives it, and some are left out
-        readings = replace(readings, direction=approach(readings.q))
+    # where the order of the rows gives it, some of them are left out
+    readings = replace(readings, direction=sense_of(readings))
     rows = _rows(campaign.pose, readings.session, np.random.default_rng(SEED))
     return Campaign(readings.part(rows), campaign.stated_tool)
 

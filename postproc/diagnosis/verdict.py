@@ -137,17 +137,16 @@ class Named:
 
 @dataclass(frozen=True)
 class Verdict:
-    """``word`` of ``VERDICTS``.  named: where the verdict is named, partly_named or ambiguous; alternatives: sets of
-    candidates that explain the same; refitted: own parameters of the model that clearly moved; reduced_chi2: remaining
-    variance over the stated one; conditional: nothing states the scatter, so a lack of fit cannot be detected;
-    remainder: patterns in what remains after all that was chosen."""
+    """``word`` of ``VERDICTS``. named: where the verdict is named, partly_named or ambiguous; alternatives: sets of
+    candidates that explain the same; refitted: own parameters of the model that clearly moved; conditional: nothing
+    states the scatter, so a lack of fit cannot be detected; remainder: patterns in what remains after all that was
+    chosen."""
 
     word: str
     named: tuple[Named, ...]
     alternatives: tuple[tuple[Candidate, ...], ...]
     not_testable: tuple[str, ...]
     refitted: tuple[Estimate, ...]
-    reduced_chi2: float
     conditional: bool
     rejected: tuple[tuple[Candidate, str], ...] = ()
     remainder: tuple[ResidualPattern, ...] = ()
@@ -159,7 +158,6 @@ def judge(search: Search) -> Verdict:
     named, rejected, aliases = [], [], []
     zeros: list[tuple[Candidate, Evidence]] = []
     groups: list[int] = []
-    chi2, _ = reduced_chi2_of(search, last)
     patterns = residual_patterns(search.confirmed, chance=STRUCTURE)
     unexplained = more_remains(search, patterns)
     for g in last.groups:
@@ -247,7 +245,6 @@ def judge(search: Search) -> Verdict:
         sets,
         hidden,
         (),
-        chi2,
         not linear.problem.known,
         tuple(rejected),
         patterns,
@@ -295,7 +292,7 @@ def _fixed_values(
         (
             t
             for t in final.model.terms
-            if (t.effect.name, t.effect.described()) == (candidate.name, candidate.effect.described())
+            if (t.effect.name, t.effect.form()) == (candidate.name, candidate.effect.form())
         ),
         None,
     )
@@ -380,13 +377,13 @@ def _against(search: Search, mine: Candidate) -> list[Alternative]:
 def _estimates(final: Fit, candidate: Candidate, search: Search) -> tuple[Estimate, ...]:
     names = {u.parameter.name for u in candidate.unknowns}
     base = len(search.base.model.terms)
-    same = candidate.effect.described()
+    same = candidate.effect.form()
     return tuple(
         e
         for e in final.estimates
         if e.unknown.parameter.name in names
         and (term := final.model.terms[e.unknown.term]).effect.name == candidate.name
-        and term.effect.described() == same
+        and term.effect.form() == same
         and (e.unknown.term >= base or e.unknown.stated is None)
     )
 

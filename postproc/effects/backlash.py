@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.base.arrays import Floats
 from postproc.base.yaml_section import YamlSection
-from postproc.effects.effect import ChainState, ComplianceLaw, Values, column, per_joint
+from postproc.effects.effect import WORN, ChainState, ComplianceLaw, Values, column, per_joint
 from postproc.robot.geometries import Joint
 
 
@@ -32,7 +32,7 @@ class Backlash(ComplianceLaw):
     def __init__(self, joints: Sequence[Joint], friction: float = 20.0) -> None:
         self.friction = friction
         source = "gap of a gear; the side follows the load, or the approach where there is none"
-        self.parameters = per_joint(joints, "b", ("rad", "m"), 0.0, 0.02, source)
+        self.parameters = per_joint(joints, "b", ("rad", "m"), 0.0, 0.02, source, plausible=WORN)
 
     @classmethod
     def from_options(cls, options: YamlSection, joints: Sequence[Joint]) -> Self:

@@ -29,6 +29,9 @@ from postproc.robot.geometries import Joint
 
 Values = Mapping[str, float]
 
+WORN = (0.0, 4e-3)
+"""[rad] Lost motion of a gear: a new one has some 3e-4 (one minute of arc), a worn-out one ten times that."""
+
 SIZES = {
     "1": 0.05,
     "m": 1e-3,
@@ -168,8 +171,12 @@ class Effect:
         return (cls(joints),)
 
     def described(self) -> dict[str, object]:
-        """The options, for reports."""
+        """All options, as a robot file states them."""
         return {}
+
+    def form(self) -> dict[str, object]:
+        """The options that make it another effect: of the rest one model has one value alone."""
+        return self.described()
 
     def gaps(self, values: Values) -> Floats:
         """(n,) [rad, m] by which a motor turns round before its joint does; of an effect ``by_direction``."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from postproc.base.arrays import Floats
-from postproc.effects.effect import Conditions, Offset, Values, column, per_joint
+from postproc.effects.effect import WORN, Conditions, Offset, Values, column, per_joint
 from postproc.robot.chain import Chain
 from postproc.robot.geometries import Joint
 
@@ -24,7 +24,7 @@ class Hysteresis(Offset):
 
     def __init__(self, joints: Sequence[Joint]) -> None:
         source = "width of the hysteresis loop of a gear at reversal"
-        self.parameters = per_joint(joints, "w", ("rad", "m"), 0.0, 0.02, source)
+        self.parameters = per_joint(joints, "w", ("rad", "m"), 0.0, 0.02, source, plausible=WORN)
 
     def add_offset(
         self, values: Values, chain: Chain, motors: Floats, conditions: Conditions, offset: Floats

@@ -55,6 +55,10 @@ class ThermalGrowth(Offset):
         return cls(joints, "temperature"), cls(joints, "time")
 
     def described(self) -> dict[str, object]:
+        reference = {} if self.reference is None else {"reference": self.reference}
+        return self.form() | reference
+
+    def form(self) -> dict[str, object]:
         return {"variable": self.variable}
 
     def add_offset(

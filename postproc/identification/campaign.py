@@ -41,6 +41,15 @@ LARGEST_SCALE = 5e-4
 """No tracker and no temperature makes more: the rest is the arm."""
 
 
+def sense_of(readings: Readings) -> Floats:
+    """(R, n) sense of approach as it is stated, else in the order of the rows of each file: how the robot came to the
+    first pose of a file is not known."""
+    if readings.direction is not None:
+        return readings.direction
+    starts = np.flatnonzero(np.append(True, np.diff(readings.file) != 0))
+    return np.concatenate([approach(rows) for rows in np.split(readings.q, starts[1:])])
+
+
 @dataclass(frozen=True)
 class PredictedReadings:
     """The tool at every state of a campaign: ``rotation`` (S, 3, 3); ``body`` (S, 3) [m], the place of the TCP without
@@ -142,11 +151,8 @@ class Campaign:
 
     def _find_states(self) -> None:
         readings, count = self.readings, len(self.readings)
-        sense = approach(readings.q) if readings.direction is None else readings.direction
-        # growth counts from the first reading: what was there before is geometry
-        warmth, time = (
-            None if given is None else given - given[0] for given in (readings.temperature, readings.time)
-        )
+        sense = sense_of(readings)
+        warmth, time = readings.warmth, readings.elapsed
         parts = [readings.q, readings.wrench, sense, warmth, time]
         key = np.column_stack([part for part in parts if part is not None])
         if readings.deflection:

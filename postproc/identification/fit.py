@@ -31,6 +31,9 @@ from postproc.model import StiffnessModel
 UNLIKELY = 0.01
 """Probability below which the residuals are taken to be more than the stated scatter."""
 
+OVERSTATED = 0.5
+"""Variance over the assumed one below which readings scatter by less, where chance hardly leaves as little."""
+
 ROUNDING = 1e-3
 """Standard deviations below which residuals are no scatter, but rounding."""
 
@@ -70,7 +73,7 @@ class Fit:
     fit changed them; point: the fitted model and its residual; unknowns (k,): found; dropped: asked for, and unchanged;
     covariance (k, k) [SI]; condition: see ``Insight``; factor: variance of the readings over what ``noise``
     states, scatter_exceeded if that is clearly more; freedom: of the residuals; quantile: half width of an interval
-    over its deviation.
+    over its deviation; variance: of the residuals over the stated one, whether or not that is clearly another.
     """
 
     campaign: Campaign
@@ -88,6 +91,7 @@ class Fit:
     scatter_exceeded: bool
     freedom: int
     quantile: float
+    variance: float
 
     @property
     def model(self) -> StiffnessModel:
@@ -102,6 +106,28 @@ class Fit:
     def shared_error(self) -> float:
         """[m] one sigma of what readings of one pose have in common in each coordinate; 0 where nothing is detected."""
         return self.weights.shared * float(np.sqrt(self.factor))
+
+    @property
+    def is_overstated(self) -> bool:
+        """Whether the residual is so small that the assumed scatter would hardly ever leave it."""
+        from scipy.special import chdtr
+
+        return bool(
+            self.variance < OVERSTATED and chdtr(self.freedom, self.freedom * self.variance) < UNLIKELY
+        )
+
+    @property
+    def times_stated(self) -> float:
+        """Root mean square residual over the stated scatter of single readings, where that is clearly more because
+        readings of a pose share an error: one of the model looks like that; 0 elsewhere."""
+        from scipy.special import chdtri
+
+        if not (self.noise.known and self.weights.shared > 0 and self.freedom > 0):
+            return 0.0
+        alone = replace(self.plain_weights, shared=0.0)
+        squares = float((alone(np.nan_to_num(self.point.residual)) ** 2).sum())
+        exceeds = squares > chdtri(self.freedom, UNLIKELY)
+        return float(np.sqrt(squares / self.freedom)) if exceeds else 0.0
 
     @cached_property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -178,7 +204,7 @@ def fit(
             point = with_columns(campaign, point, free)
         judged = 1.0 if not complete and noise.known else np.inf
         analysis, before = _insight(campaign, point, free, weights, factor, judged), factor
-        factor, exceeded, freedom, quantile = _variance(
+        factor, exceeded, freedom, quantile, variance = _variance(
             campaign, point, free, weights, plain, noise, analysis
         )
         if again and not exactly and abs(np.log(factor / before)) > SAME_FACTOR:
@@ -204,6 +230,7 @@ def fit(
     return Fit(
         campaign, start, tuple(unknowns), noise, weights, plain, point, tuple(free), tuple(dropped),
         analysis.covariance * np.outer(scale, scale), analysis.condition, factor, exceeded, freedom, quantile,
+        variance,
     )  # fmt: skip
 
 
@@ -325,9 +352,9 @@ def _variance(
     plain: Weighting,
     noise: Noise,
     analysis: Identifiability,
-) -> tuple[float, bool, int, float]:
-    """Variance of the readings over the assumed one, whether that is clearly more, degrees of freedom, and the 97.5 %
-    quantile that goes with them.
+) -> tuple[float, bool, int, float, float]:
+    """Variance of the readings over the assumed one, at least 1 unless it is clearly more, whether it is, degrees of
+    freedom, the 97.5 % quantile that goes with them, and that variance as it is.
 
     It is that of what no values of the unknowns would take away, so that a prior that contradicts the readings does
     not make them worse.  A residual that a robust fit weighs down counts with as much as it pulls, and its reading as a
@@ -346,9 +373,9 @@ def _variance(
     squares = float(residual @ residual)
     freedom = max(0, round(share.sum()) - q.shape[1])
     if freedom == 0:
-        return 1.0, False, 0, float(ndtri(0.975))
+        return 1.0, False, 0, float(ndtri(0.975)), 1.0
     exceeded = bool(noise.known and squares > chdtri(freedom, UNLIKELY))
     if noise.known and not exceeded:
         least = 1.0 if weights is plain else max(1.0, squares / freedom)
-        return least, False, freedom, float(ndtri(0.975))
-    return squares / freedom, exceeded, freedom, float(stdtrit(freedom, 0.975))
+        return least, False, freedom, float(ndtri(0.975)), squares / freedom
+    return squares / freedom, exceeded, freedom, float(stdtrit(freedom, 0.975)), squares / freedom

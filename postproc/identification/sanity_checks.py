@@ -15,14 +15,14 @@ from postproc.base.arrays import Floats
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
-from postproc.identification.campaign import Campaign
+from postproc.identification.campaign import Campaign, sense_of
 from postproc.identification.changed_readings import changed_readings
 from postproc.identification.least_squares import at, bounded_step, descended, reach, with_columns
 from postproc.identification.noise import noise_of, weighting
 from postproc.identification.registration import registered
 from postproc.identification.unknowns import Unknown
 from postproc.measurements import Readings
-from postproc.model import StiffnessModel, approach
+from postproc.model import StiffnessModel
 
 TURN = 6.6
 """[deg] A little more than the radians of a full turn."""
@@ -361,7 +361,7 @@ def _first_steps(
         return [_remaining_share(Campaign(one, tool), model, unknowns)[0] for one in tried]
     # the states of all at once
     count = len(tried[0])
-    came = [approach(one.q) if one.direction is None else one.direction for one in tried]
+    came = [sense_of(one) for one in tried]
     joined = replace(
         tried[0].part(np.tile(np.arange(count), len(tried))),
         q=np.concatenate([one.q for one in tried]),

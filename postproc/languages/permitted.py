@@ -12,6 +12,7 @@ from postproc.base.batches import in_blocks
 from postproc.base.document import Document, Edits
 from postproc.base.findings import Finding, Refusal
 from postproc.languages.dialect import EditSyntax, Program
+from postproc.languages.single_values import are_words, is_one_value
 from postproc.toolpath import Toolpath
 
 EDITS = 1 << 15
@@ -48,13 +49,12 @@ def refuse_other(program: Program, edits: Edits, letters: bytes) -> None:
 
     Where the language has no addresses (``EditSyntax``), the number of a coordinate is one in a list.
     """
-    words = _table(_TARGET + letters + letters.lower())
     for index, document in enumerate(program.documents):
         own = edits.of(index)
         moving = _lines_of_motions(program.toolpath, document) if index == 0 else None
         if moving is not None and program.edit_syntax.points[1]:
             moving[program.edit_syntax.points[1]] = True
-        look = _Look(document, own, words, moving, program.edit_syntax)
+        look = _Look(document, own, letters, moving, program.edit_syntax)
         for wrong in in_blocks(look.first_wrong, len(own), EDITS):
             if wrong >= 0:
                 edit = own[wrong]
@@ -83,12 +83,13 @@ class _Look:
     """Of the edits of a document; ``moving``: lines with a motion, None in a companion, where none are."""
 
     def __init__(
-        self, document: Document, edits: Edits, words: Bools, moving: Bools | None, syntax: EditSyntax
+        self, document: Document, edits: Edits, letters: bytes, moving: Bools | None, syntax: EditSyntax
     ) -> None:
-        self.syntax = syntax
+        self.syntax, self.letters = syntax, letters
         self.raw = np.frombuffer(document.raw, np.uint8)
         self.texts = np.frombuffer(edits.texts, np.uint8)
-        self.begins, self.edits, self.words, self.moving = document.line_starts, edits, words, moving
+        self.words = _table(_TARGET + letters + letters.lower())
+        self.begins, self.edits, self.moving = document.line_starts, edits, moving
         self.head = len(BOM_UTF8) if document.raw.startswith(BOM_UTF8) else 0
 
     def first_wrong(self, part: slice) -> int:
@@ -106,6 +107,11 @@ class _Look:
         filled = to > at
         number = filled & (ends[1:] > ends[:-1]) & ~_any(~_NUMBER[texts], ends[:-1], ends[1:])
         wrong = _any(~self.words[raw], at, to)
+        for k in np.flatnonzero(wrong & number).tolist():
+            # An expression has names of its own: Y[#<width>*2], X=WIDTH+2.
+            wrong[k] = bool(self.syntax.numbers_after) or not is_one_value(
+                raw[at[k] : to[k]].tobytes(), self._is_assigned(int(start[k]))
+            )
         placed = self._listed(start) if self.syntax.numbers_after else self._addressed(start)
         wrong |= number & ~placed
         starts = self.begins[low:high] - region.start
@@ -142,6 +148,11 @@ class _Look:
             good &= ~named | pair
         return np.asarray(good & _COORDINATE[letter] & (at >= 0))
 
+    def _is_assigned(self, start: int) -> bool:
+        """Whether ``=`` is before what starts there, or ``=AC(``."""
+        before = self.raw[max(start - 80, 0) : start].tobytes().rstrip(b" \t")
+        return before.endswith((b"=", b"("))
+
     def _listed(self, start: Ints) -> Bools:
         """(K,) whether a sign of a list is before, with nothing but blanks and line ends between."""
         at = start - 1
@@ -168,6 +179,9 @@ class _Look:
         whole = closed & (to == at) & alone
         spelt = self.words[texts] | feeds | (texts == _CR)
         wrong = _any(~spelt, ends[:-1], ends[1:])
+        if not self.syntax.numbers_after:
+            for k in np.flatnonzero(wrong).tolist():  # F#<feed>, F=WIDTH*2 of an inserted block
+                wrong[k] = not are_words(texts[ends[k] : ends[k + 1]].tobytes(), self.letters)
         if self.moving is None:
             last = len(self.raw) - self.begins[low]
             return np.asarray(wrong | ~(whole | (lines & (at == to) & (at == last))))

@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 from postproc.base.findings import Finding, Refusal
-from postproc.base.tables import CsvTable
+from postproc.base.tables import CsvTable, mixes_decimals
 from postproc.learning.deviation_signs import SIGNS
 
 NEAR = 0.5
@@ -38,6 +38,8 @@ def check_by_hand(
     if len(numbers) == 1:
         numbers = numbers[0].split(",")
     try:
+        if mixes_decimals(numbers):
+            raise ValueError
         place = np.array([float(one.replace(",", ".")) for one in numbers])
     except ValueError:
         place = np.zeros(0)

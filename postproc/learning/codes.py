@@ -166,6 +166,22 @@ CODES = define(
             action="Look at one place of the part again and add `# checked:`, or the measured places (MX, MY, MZ).",
             example="A first part of a robot and forces that are nearly as stated.",
         ),
+        "LRN022": Code(
+            "warning",
+            "features of which no point is used",
+            meaning="Every point of a feature is excluded: touched by no tool, or cut by more than one motion.",
+            consequence="Nothing is learnt of this feature, and the promise does not include it.",
+            action="Check its points and normals; LINE or OPERATION names the motion that leaves them.",
+            example="A wall whose nominal points are those of an earlier drawing.",
+        ),
+        "LRN023": Code(
+            "info",
+            "more remains than the probe scatters",
+            meaning="What neither causes nor a smooth error explain is larger than the stated scatter of the probe.",
+            consequence="It stays on the next part; intervals and promise include it.",
+            action="Measure some points again: what they show again is of the part, the rest is of the probe.",
+            example="Chatter marks, or `# sigma_mm: 0.001` for a probe of 0.01 mm.",
+        ),
         "LRN021": Code(
             "warning",
             "measured places are not corrected",

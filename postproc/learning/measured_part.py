@@ -12,6 +12,7 @@ import numpy as np
 from postproc.base.arrays import Floats, Ints, frozen
 from postproc.base.findings import Finding, Refusal, nearest
 from postproc.base.tables import CsvTable, is_missing, read_table
+from postproc.base.tables.header_units import without_units
 from postproc.base.units import MM
 from postproc.learning.checked_place import check_by_hand
 from postproc.learning.deviation_signs import SIGNS
@@ -48,8 +49,7 @@ ROWS = (
 
 SHOWN = 3
 
-_UNIT = re.compile(r"^(?P<name>[a-z]+)\s*[\[(](?P<unit>[^\])]*)[\])]$")
-_UNITS = {"dev": "mm", "sigma": "mm", "t": "s", "temp": "degc", **dict.fromkeys((*PLACE, *MEASURED), "mm")}
+_UNITS = {"dev": "mm", "sigma": "mm", "t": "s", "temp": "degC", **dict.fromkeys((*PLACE, *MEASURED), "mm")}
 _KEYED = re.compile(r"([^:=]*+)[:=]\s*+(.*)")
 _HEX = re.compile(r"[0-9a-f]{12,64}\Z")
 
@@ -180,20 +180,8 @@ def _read(path: Path) -> MeasuredPart:
 
 def _named(table: CsvTable, needed: Sequence[str] = (*PLACE, *NORMAL, "dev")) -> CsvTable:
     """The table with its units checked and taken off the names of its columns; ``needed``: names that must be there."""
-    columns: dict[str, object] = {}
-    for head, column in table.columns.items():
-        unit = _UNIT.match(head)
-        name = unit["name"] if unit else head
-        if (
-            unit
-            and name in COLUMNS
-            and unit["unit"].strip().lower().replace("°", "deg") != _UNITS.get(name, "")
-        ):
-            expected = _UNITS.get(name) or "no unit"
-            raise table.header_error(f"the unit of column {head!r} is wrong: {expected} is expected")
-        if name in columns:
-            raise table.header_error(f"column {name!r} occurs twice")
-        columns[name] = column
+    table = without_units(table, {**dict.fromkeys(COLUMNS, ""), **_UNITS})
+    columns = table.columns
     unknown = [name for name in columns if name not in COLUMNS]
     for name in needed:
         if name not in columns:
@@ -208,16 +196,7 @@ def _named(table: CsvTable, needed: Sequence[str] = (*PLACE, *NORMAL, "dev")) ->
     for name in unknown:
         help = "remove it, or rename it to one of " + ", ".join(name.upper() for name in COLUMNS)
         raise table.header_error(f"column {name[:40]!r} is unknown{nearest(name, COLUMNS)}", help)
-    return CsvTable(
-        table.path,
-        table.code,
-        columns,  # type: ignore[arg-type]
-        table.lines,
-        table.header_line,
-        table.separator,
-        table.comments,
-        table.digest,
-    )
+    return table
 
 
 def _stated(table: CsvTable) -> tuple[dict[str, tuple[int, str]], list[Finding]]:

@@ -148,16 +148,21 @@ def learned_error(
 
 
 def wall_sides(
-    result: Attribution, path: DesiredPath, operations: OperationNames, tool: Ints, ball: Sequence[int]
+    result: Attribution,
+    path: DesiredPath,
+    operations: OperationNames,
+    tool: Ints,
+    ball: Sequence[int],
+    hand: Ints,
 ) -> dict[str, int]:
     """Operation -> side of the feed, 1: right, -1: left, seen along the spindle towards the tip, on which its measured
-    walls lie, where that is one; tool (N,): numbers; of tools with a ``ball`` only where no surface is inclined, as
-    their radius acts less there."""
+    walls lie as programmed, where that is one; tool (N,): numbers; of tools with a ``ball`` only where no surface is
+    inclined, as their radius acts less there; hand (N,): as of ``ToolDisplacement``."""
     points = result.prediction.points
     tangent = path.tangent(points.row, points.share)
     across = np.cross(points.spindle, tangent)
     # the material is where the outward normal comes from
-    towards = -np.sum(across * points.normal, axis=1)
+    towards = -np.sum(across * points.normal, axis=1) * hand[points.row]
     wall = np.abs(towards) > 0.5
     along = np.abs(np.sum(points.spindle * points.normal, axis=1))
     inclined = np.isin(tool[points.row], ball) & (along > _FLAT) & (along < 1 - _FLAT)

@@ -217,13 +217,9 @@ def check_nominal(part: MeasuredPart, distance: Floats) -> list[Finding]:
     ]
 
 
-def check_shift(part: MeasuredPart, distance: Floats) -> list[Finding]:
-    """Whether all points lie beside the surface by one shift d, by n . d each; distance (K,) [m] of the points to the
-    tool, NaN where none touches."""
-    known = np.flatnonzero(np.isfinite(distance))
-    if len(known) < max(FEW, 0.5 * len(distance)):
-        return []
-    normal, off = part.normal[known], distance[known]
+def find_shift(normal: Floats, off: Floats) -> Floats | None:
+    """The shift d (3,) [m] by which points with normals (K, 3) lie beside the surface: off (K,) [m] is n . d of nearly
+    all of them; None where there is none."""
     shift: Floats = np.zeros(3)
     rest: Floats = off
     weight = np.ones(len(off))
@@ -231,12 +227,10 @@ def check_shift(part: MeasuredPart, distance: Floats) -> list[Finding]:
         shift = np.asarray(np.linalg.lstsq(weight[:, None] * normal, weight * off, rcond=None)[0], float)
         rest = np.abs(off - normal @ shift)
         weight = 1.0 / np.maximum(rest, 0.1 * SHIFTED)
-    if np.linalg.norm(shift) < SHIFTED or np.mean(rest < 0.5 * SHIFTED) < ALIKE:
-        return []
-    words = ", ".join(f"{axis} {one / MM:+.2f}" for axis, one in zip("XYZ", shift.tolist(), strict=True))
-    message = f"all points are shifted against the surface of this program by {words} mm"
-    help = "measure in the axes of the program's $BASE, or move the points: their origin is another one"
-    return [Finding("LRN003", message, str(part.file), help=help)]
+    if not len(off):
+        return None
+    found = np.linalg.norm(shift) >= SHIFTED and np.mean(rest < 0.5 * SHIFTED) >= ALIKE
+    return shift if found else None
 
 
 def check_explained(result: Attribution, file: str) -> list[Finding]:
@@ -284,6 +278,20 @@ def check_explained(result: Attribution, file: str) -> list[Finding]:
         )
         findings.append(Finding("LRN004", message, file, help=help))
     return findings
+
+
+def scatter_findings(result: Attribution, file: str) -> list[Finding]:
+    """LRN023: what neither causes nor smooth error explain is clearly larger than the stated scatter of the probe."""
+    rest = (result.deviation - result.by_alignment - result.by_causes - result.by_field)[result.kept]
+    remains, stated = (float(np.sqrt(np.mean(one**2))) for one in (rest, result.layout.sigma[result.kept]))
+    if len(rest) < FEW or remains < REMAINING * stated:
+        return []
+    message = (
+        f"{remains / MM:.4f} mm RMS remain unexplained, {remains / stated:.2g} times the stated scatter of the probe"
+        f" ({stated / MM:.4f} mm): sigma_mm is too small, or something differs from point to point"
+    )
+    help = "measure some points again: what they show again is of the part, the rest is of the probe"
+    return [Finding("LRN023", message, file, help=help)]
 
 
 def _gain_over_scatter(result: Attribution) -> float:

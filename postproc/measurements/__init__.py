@@ -12,10 +12,19 @@ The file is in mm, deg, N, N m, s and degC.  ``read_measurements`` reads it, ``m
 """
 
 from postproc.measurements import codes as codes
+from postproc.measurements.copied_rows import not_fitted
 from postproc.measurements.header_comments import robot_named
 from postproc.measurements.joining import joined
 from postproc.measurements.read_csv import read_measurements
 from postproc.measurements.readings import Readings, planned
 from postproc.measurements.write_csv import measurements_csv
 
-__all__ = ["Readings", "joined", "measurements_csv", "planned", "read_measurements", "robot_named"]
+__all__ = [
+    "Readings",
+    "joined",
+    "measurements_csv",
+    "not_fitted",
+    "planned",
+    "read_measurements",
+    "robot_named",
+]

@@ -99,8 +99,11 @@ CODES = define(
         ),
         "MEA012": Code(
             "warning",
-            "readings of two files are the same",
-            meaning="Rows of two files agree in every digit of joints, loads and values.",
+            "readings are copies",
+            meaning=(
+                "Rows of two files agree in every digit of joints, loads and values, or more rows of one file do than "
+                "repeated readings that are rounded."
+            ),
             consequence="They count once; twice, intervals would be too narrow.",
             action="Name each file once, and remove copies of rows.",
             example="A file and a copy of it with another comment.",

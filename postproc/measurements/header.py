@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from postproc.base.findings import Refusal, nearest
 from postproc.base.tables import CsvTable
+from postproc.base.tables.header_units import check_unit, split_unit
 
 WRENCH = ("FX", "FY", "FZ", "MX", "MY", "MZ")
 PLACE, ANGLES = ("X", "Y", "Z"), ("A", "B", "C")
@@ -18,17 +19,6 @@ OPTIONAL = ("TARGET", "T", "TEMP", "SIGMA", "REPEAT", "SESSION")
 RESERVED = frozenset(name.lower() for name in (*WRENCH, *PLACE, *ANGLES, *SHIFT, *TURN, *OPTIONAL))
 """What is more than a joint, in lower case."""
 
-# unit -> (how people write it, what is expected in words)
-_UNITS = {
-    "deg": (("deg", "degree", "degrees", "°"), "degrees are expected"),
-    "mm": (("mm",), "millimetres are expected"),
-    "N": (("n",), "newtons are expected"),
-    "N m": (("n m", "nm", "n*m", "n·m"), "newton metres are expected"),
-    "s": (("s",), "seconds are expected"),
-    "degC": (("degc", "°c", "c"), "degrees Celsius are expected"),
-    "": ((), "this column has no unit"),
-}
-_BRACKETS = {"]": "[", ")": "("}
 _DIRECTION_LIKE = re.compile(r"dir[0-9]+")
 _CLOSE = 0.75
 _JOINT_LIKE = re.compile(r"[aej][0-9]+")
@@ -83,11 +73,7 @@ def split_columns(
                 raise _unknown(table, head, own, joints, spelled)
             ignored.append(name)
             continue
-        words, expected = _UNITS[units[spelled[name]]]
-        if unit and unit not in words:
-            raise table.header_error(
-                f"the unit of column {head!r} is wrong: {expected}", "convert the column and its header"
-            )
+        check_unit(table, head, unit, units[spelled[name]])
     axes = {name: table.columns[heads[name.lower()][0]] for name in own}
     rest = {spelled[name]: table.columns[heads[name][0]] for name in others if name in spelled}
     extra = {heads[name][0]: table.columns[heads[name][0]] for name in ignored}
@@ -111,21 +97,11 @@ def _heads(table: CsvTable, joints: Sequence[tuple[str, bool]]) -> Mapping[str, 
     own = [name.lower() for name, _ in joints]
     heads: dict[str, tuple[str, str]] = {}
     for head in table.columns:
-        name, unit = (head, "") if head in own else _split_unit(head)
+        name, unit = (head, "") if head in own else split_unit(head)
         if name in heads:
             raise table.header_error(f"columns {heads[name][0]!r} and {head!r} are the same")
-        heads[name] = head, " ".join(unit.split())
+        heads[name] = head, unit
     return heads
-
-
-def _split_unit(head: str) -> tuple[str, str]:
-    """Name and unit of ``name [unit]`` or ``name (unit)``."""
-    closing = head[-1:]
-    if closing not in _BRACKETS:
-        return head, ""
-    opening = head.find(_BRACKETS[closing], head.rfind(closing, 0, -1) + 1)
-    name = head[: max(opening, 0)].rstrip()
-    return (head, "") if opening < 0 or "\n" in name else (name, head[opening + 1 : -1])
 
 
 def _joint_columns(table: CsvTable, heads: Collection[str], joints: Sequence[tuple[str, bool]]) -> list[str]:

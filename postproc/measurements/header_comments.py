@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import numpy as np
 from postproc.base.arrays import Floats
 from postproc.base.findings import Finding, Refusal, nearest
 from postproc.base.geometry import Poses
-from postproc.base.tables import CsvTable, comments_above, finite_number
+from postproc.base.tables import CsvTable, comments_above, finite_number, mixes_decimals
 from postproc.base.units import DEG, MM
 
 KEYS = ("robot", "frame", "tool", "sigma_mm", "sigma_deg", "target", "base_target")
@@ -73,7 +74,7 @@ def stated_in(table: CsvTable) -> HeaderComments:
         if parsed is not None and len(parsed) in counts:
             return parsed
         what = f"{text[:40]!r} is not understood" if parsed is None else f"{len(parsed)} numbers are given"
-        help = "separate the numbers by blanks; a comma in a number is a decimal comma then"
+        help = "separate the numbers by blanks; a comma in a number is a decimal comma then, in all of them"
         raise _wrong(table, line, f"# {_title(key, name)}: {what} where {form} is expected", help)
 
     def sigma(key: str, unit: float) -> float | None:
@@ -98,22 +99,13 @@ def stated_in(table: CsvTable) -> HeaderComments:
     }
     placed = {("tool", ""): tool[:3]}
     placed |= {(key, name): numbers(key, (3,), "x y z (mm)", name) for name, key in stated.items()}
-    findings += [
-        _implausible(
-            table,
-            values[key][0],
-            f"# {_title(*key)}: its largest coordinate",
-            max(map(abs, place)),
-            "in metres",
-        )
-        for key, place in placed.items()
-        if place and 0.0 < max(map(abs, place)) < METRES
-    ]
+    for key, place in placed.items():
+        if place:
+            findings += in_metres(f"# {_title(*key)}", place, str(table.path), values[key][0])
     if sigma_place is not None and sigma_place > SCATTER * MM:
         line = values["sigma_mm", ""][0]
-        findings.append(
-            _implausible(table, line, "# sigma_mm: the scatter", sigma_place / MM, "in micrometres")
-        )
+        message = f"# sigma_mm: the scatter is {sigma_place / MM:g} mm, as if it were in micrometres"
+        findings.append(Finding("MEA014", message, str(table.path), line, help="lengths are in mm"))
     return HeaderComments(
         robot=robot,
         frame=frame,
@@ -189,12 +181,15 @@ def _close(word: str) -> str:
 
 def _numbers(text: str) -> list[float] | None:
     """Numbers separated by blanks, commas or semicolons; a comma is a decimal comma where blanks or semicolons
-    separate.  None where one is no number, or commas do both."""
+    separate.  None where one is no number, commas do both, or decimals are after commas and points."""
     beside_blank = ";" not in text and re.search(r",\s|\s,", text)
     if beside_blank and re.search(r"\S,\S", text):
         return None
     by_commas = beside_blank or not re.search(r"[;\s]", text)
-    words = re.split(r"[,\s]+", text) if by_commas else re.split(r"[;\s]+", text.replace(",", "."))
+    words = re.split(r"[,\s]+" if by_commas else r"[;\s]+", text)
+    if mixes_decimals(words):
+        return None
+    words = [word.replace(",", ".") for word in words]
     numbers = [number for number in map(finite_number, words) if number is not None]
     return numbers if len(numbers) == len(words) else None
 
@@ -203,9 +198,15 @@ def _title(key: str, name: str) -> str:
     return f"{key} {name}".rstrip()
 
 
-def _implausible(table: CsvTable, line: int, what: str, value: float, unit: str) -> Finding:
-    message = f"{what} is {value:g} mm, as if it were {unit}"
-    return Finding("MEA014", message, str(table.path), line, help="lengths are in mm")
+def in_metres(
+    what: str, place: Sequence[float], file: str, line: int = 0, least: float = METRES
+) -> list[Finding]:
+    """MEA014 for a ``place`` (3,) [mm] that is nearer to its origin than ``least`` [mm]: it was written in metres."""
+    largest = max(map(abs, place))
+    if not 0.0 < largest < least:
+        return []
+    message = f"{what}: its largest coordinate is {largest:g} mm, as if it were in metres"
+    return [Finding("MEA014", message, file, line, help="lengths are in mm")]
 
 
 def _wrong(table: CsvTable, line: int, message: str, help: str = "") -> Refusal:

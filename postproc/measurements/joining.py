@@ -12,23 +12,21 @@ import numpy as np
 from postproc.base.arrays import Floats, Ints
 from postproc.base.findings import Finding, Refusal
 from postproc.base.units import DEG, MM
+from postproc.measurements.copied_rows import each_once
 from postproc.measurements.header import expected_joints, value_columns
 from postproc.measurements.header_comments import FRAMES
 from postproc.measurements.readings import ARRAYS, Readings, numbered
 from postproc.measurements.write_csv import number_texts, pose_text
-
-COPIES = 3
-"""So many equal rows of two files are no coincidence."""
 
 
 def joined(several: Sequence[Readings]) -> Readings:
     """The readings of several files, one after the other; their sessions and repeats stay apart.
 
     A session is called ``stem`` of its file, or ``stem:session``.  Refusal MEA008 where they differ in what must be
-    the same.
+    the same.  Rows that are copies count once.
     """
     if len(several) == 1:
-        return several[0]
+        return each_once(several[0])
     for one, other in combinations(several, 2):
         _check_alike(one, other)
     targets, _ = numbered([name for one in several for name in one.targets])
@@ -72,25 +70,7 @@ def joined(several: Sequence[Readings]) -> Readings:
         extras=extras,
         **arrays,
     )
-    return _each_once(whole)
-
-
-def _each_once(readings: Readings) -> Readings:
-    """Without rows that another file has digit by digit (MEA012)."""
-    one = readings
-    parts = [one.q, one.wrench, np.nan_to_num(one.value), one.target[:, None]]
-    if one.time is not None:
-        parts.append(one.time[:, None])
-    _, first, of = np.unique(np.column_stack(parts), axis=0, return_index=True, return_inverse=True)
-    first = first[of.reshape(-1)]
-    copied = (one.file != one.file[first]) & np.isfinite(one.value).all(axis=1)
-    if copied.sum() < COPIES:
-        return readings
-    row = int(np.argmax(copied))
-    other = one.where(int(first[row]))
-    message = f"{int(copied.sum())} readings are those of {other[0]} digit by digit (line {other[1]}): they count once"
-    finding = Finding("MEA012", message, *one.where(row))
-    return replace(one.part(~copied), findings=(*one.findings, finding))
+    return each_once(whole)
 
 
 def _apart(parts: Sequence[Ints], counts: Sequence[int]) -> list[Ints]:

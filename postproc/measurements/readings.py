@@ -41,6 +41,7 @@ class Readings:
 
     repeat (R,): rows that repeat one state share a number from 0, -1 elsewhere; session (R,) index into ``sessions``;
     time (R,) [s], temperature (R,) [degC], direction (R, n) sense of approach -1, 0, 1, each None where not stated.
+    ``reference`` [degC], ``start`` [s]: from which growth counts; None: that of the first reading.
 
     file (R,) index into ``files`` and line (R,): where the row is, -1 and 0 for a row of no file.
     """
@@ -72,6 +73,8 @@ class Readings:
     findings: tuple[Finding, ...] = ()
     on_base: frozenset[str] = frozenset()
     extras: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    reference: float | None = None
+    start: float | None = None
 
     def __post_init__(self) -> None:
         n = len(self.joints)
@@ -89,12 +92,32 @@ class Readings:
         return len(self.q)
 
     def part(self, rows: Any) -> Readings:
-        """Some of the readings; the names of targets, sessions and files stay."""
+        """Some of the readings; the names of targets, sessions and files stay, and so does what growth counts from."""
         given: dict[str, Any] = {name: getattr(self, name) for name in ARRAYS}
         given = {name: None if values is None else values[rows] for name, values in given.items()}
         kept = np.arange(len(self))[rows].tolist()
         extras = {name: tuple(texts[row] for row in kept) for name, texts in self.extras.items()}
-        return replace(self, **given, extras=extras)
+        return replace(self, **given, extras=extras, reference=self.calibrated_at, start=self.started_at)
+
+    @property
+    def calibrated_at(self) -> float | None:
+        """[degC] from which growth by temperature counts; None without temperatures."""
+        return _first(self.temperature, self.reference)
+
+    @property
+    def started_at(self) -> float | None:
+        """[s] from which growth by time counts; None without times."""
+        return _first(self.time, self.start)
+
+    @property
+    def warmth(self) -> Floats | None:
+        """(R,) [K] over the temperature from which growth counts; None without temperatures."""
+        return _over(self.temperature, self.calibrated_at)
+
+    @property
+    def elapsed(self) -> Floats | None:
+        """(R,) [s] since the time from which growth counts; None without times."""
+        return _over(self.time, self.started_at)
 
     @property
     def based(self) -> Bools:
@@ -106,6 +129,16 @@ class Readings:
         """File and line of a reading; ("", 0) for one of no file."""
         file = int(self.file[row])
         return ("", 0) if file < 0 else (str(self.files[file]), int(self.line[row]))
+
+
+def _first(values: Floats | None, stated: float | None) -> float | None:
+    if values is None or not len(values):
+        return None
+    return float(values[0]) if stated is None else stated
+
+
+def _over(values: Floats | None, zero: float | None) -> Floats | None:
+    return None if values is None or zero is None else np.asarray(values - zero)
 
 
 def planned(

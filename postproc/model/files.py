@@ -28,7 +28,7 @@ def read_terms(robot: Robot) -> tuple[EffectInstance, ...]:
         section.only("effect", "options", "parameters")
         effect = EFFECTS[entry.name].from_options(section.section("options", {}), robot.joints)
         for term in terms:
-            if (term.effect.name, term.effect.described()) == (effect.name, effect.described()):
+            if (term.effect.name, term.effect.form()) == (effect.name, effect.form()):
                 raise section.error("YML004", f"the same effect is defined in line {term.line}", "effect")
         given = section.section("parameters", {})
         given.only(*(parameter.name for parameter in effect.parameters))

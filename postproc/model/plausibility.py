@@ -17,6 +17,9 @@ from postproc.robot.geometries import KukaLengths, KukaVariant
 IMPLAUSIBLE_SAG = 0.5 * DEG
 """A joint that its own balancer deflects this far is not balanced: some ten times what weight does to a heavy arm."""
 
+FARTHEST = 12.0
+"""[m] The links of an arm with its foot are shorter together; a rail is no link."""
+
 SHORT = 5.0 * MM
 """The links of an arm that carries a spindle are longer, or have no length."""
 
@@ -51,7 +54,13 @@ def find_implausible(model: Mechanics) -> list[Finding]:
 
 
 def _links(model: Mechanics) -> Iterator[Finding]:
-    """Links that are short as if they were in metres, where mm are stated."""
+    """Links that are short or long as if they were in another unit."""
+    reach = sum(float(np.linalg.norm(joint.placement.position)) for joint in model.robot.joints)
+    if reach > FARTHEST:
+        message = f"the arm is {reach:.4g} m long: the unit of its lengths is probably another one"
+        yield Finding(
+            "MOD004", message, str(model.robot.path), help="check the lengths of geometry and `unit`"
+        )
     arm = model.robot.nominal
     lengths = arm.lengths if isinstance(arm, KukaVariant) else arm
     if not isinstance(lengths, KukaLengths):

@@ -30,6 +30,14 @@ CODES = define(
             action="Check the folder's rights and the free space, or name another place.",
             example="`compensate panel.src -o /media/usb` with a write-protected medium.",
         ),
+        "FIL017": Code(
+            "error",
+            "edited file would be replaced",
+            meaning="The folder has a file of this name with another content, as after your edits.",
+            consequence="It stays as it is; nothing is written.",
+            action="Keep it, name another folder, or ask for the new file with --replace.",
+            example="`compensate posts robodk -o C:/RoboDK/Posts` after editing the post there.",
+        ),
     }
 )
 

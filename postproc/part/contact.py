@@ -85,14 +85,14 @@ def find_contacts(
     ``only``: number of a point -> rows (J,) of the motions that may have left it; ``touch`` [m]: distance up to which
     a tool touches.
     """
-    which, at = _near_pairs(motions, point)
+    which, at = _near_pairs(motions, point, max(_NEAR, touch))
     if only:
         keep = np.ones(len(which), bool)
         for number, rows in only.items():
             own = np.flatnonzero(which == number)
             keep[own] = np.isin(motions.rows[at[own]], rows)
         which, at = which[keep], at[keep]
-    near = _may_touch(motions, point, which, at)
+    near = _may_touch(motions, point, which, at, max(10 * TOUCH, touch))
     which, at = which[near], at[near]
     share, distance, supports, aside = _closest(motions, point[which], normal[which], at)
     good = (np.abs(distance) <= touch) & supports
@@ -104,8 +104,8 @@ def find_contacts(
     return Contacts(last, _last_visit(count, which, row, share, distance, aside, first))
 
 
-def _near_pairs(motions: CuttingMotions, point: Floats) -> tuple[Ints, Ints]:
-    """(P,) numbers of points and (P,) of motions that may touch each other.
+def _near_pairs(motions: CuttingMotions, point: Floats, distance: float) -> tuple[Ints, Ints]:
+    """(P,) numbers of points and (P,) of motions that may come as near to each other as ``distance`` [m].
 
     First blocks of motions by their boxes, then the motions of these by their chords.
     """
@@ -120,13 +120,13 @@ def _near_pairs(motions: CuttingMotions, point: Floats) -> tuple[Ints, Ints]:
         sagitta[arcs] = motions.path.length[motions.rows[arcs]]
     high = np.array([min(cutter.edge_length, _EDGE) for cutter in motions.cutters])[motions.cutter]
     wide = np.array([cutter.radius for cutter in motions.cutters])[motions.cutter]
-    reach = np.hypot(wide, high) + sagitta + _NEAR
+    reach = np.hypot(wide, high) + sagitta + distance
     low, top = np.minimum(start.position, end.position), np.maximum(start.position, end.position)
     edges = np.arange(0, count, _BLOCK)
     box_low = np.minimum.reduceat(low - reach[:, None], edges)
     box_top = np.maximum.reduceat(top + reach[:, None], edges)
     turn = np.nan_to_num(motions.path.angle[motions.rows], posinf=0.5)
-    slack = sagitta + high * np.minimum(turn, 0.5) + _NEAR
+    slack = sagitta + high * np.minimum(turn, 0.5) + distance
     pairs: list[tuple[Ints, Ints]] = []
     for block, (least, most) in enumerate(zip(box_low, box_top, strict=True)):
         inside = np.flatnonzero(((point >= least) & (point <= most)).all(axis=1))
@@ -152,8 +152,8 @@ def _near_pairs(motions: CuttingMotions, point: Floats) -> tuple[Ints, Ints]:
     return np.concatenate([one for one, _ in pairs]), np.concatenate([other for _, other in pairs])
 
 
-def _may_touch(motions: CuttingMotions, point: Floats, which: Ints, at: Ints) -> Bools:
-    """(P,) pairs whose cutter comes near, by three places of the motion; a cutter is 1-Lipschitz."""
+def _may_touch(motions: CuttingMotions, point: Floats, which: Ints, at: Ints, touch: float) -> Bools:
+    """(P,) pairs whose cutter comes as near as ``touch`` [m], by three places; a cutter is 1-Lipschitz."""
     near = np.zeros(len(which), bool)
     for first in range(0, len(which), _PAIRS // 8):
         part = slice(first, first + _PAIRS // 8)
@@ -164,7 +164,7 @@ def _may_touch(motions: CuttingMotions, point: Floats, which: Ints, at: Ints) ->
             distance, _ = _distances(motions, point[number], motion, np.full(len(number), share))
             least = np.minimum(least, distance)
         angle = np.nan_to_num(motions.path.angle[motions.rows[motion]], posinf=0.5)
-        near[part] = least <= (length + angle * _EDGE) / 6 + 10 * TOUCH
+        near[part] = least <= (length + angle * _EDGE) / 6 + touch
     return near
 
 

@@ -162,6 +162,7 @@ def solve_coupled(
     wrench, to_stock = task.force.along(at_motion, at_share), displaced.to_stock(at_motion)
     # a correction brings the tool near to the nominal engagement, whose wrenches these are
     slack, solved, known = _LEAST, None, int(displaced.division is not None)
+    residual = np.zeros(count)
     for _ in range(_ROUNDS):
         base, slope = _linear(displaced, at_motion, at_share, wrench, to_stock)
         if not (np.isfinite(base).all() and np.isfinite(slope).all()):
@@ -169,7 +170,7 @@ def solve_coupled(
         guess = _rotated(to_stock, wrench)
         for attempt in range(_ATTEMPTS):
             listed = base + np.einsum("kij,kj->ki", slope, guess)
-            solved = Nodes(base, slope, np.ascontiguousarray(guess), np.zeros(count), np.zeros(count))
+            solved = Nodes(base, slope, np.ascontiguousarray(guess), residual, np.zeros(count))
             _solve(run, paths, pieces, solved, Expected(listed, slack, known), lever)
             guess, known = solved.wrench, 1
             moved = base + np.einsum("kij,kj->ki", slope, guess)

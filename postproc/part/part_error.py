@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.batches import in_blocks
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import lengths
 from postproc.base.units import DEG, MM
@@ -91,7 +92,13 @@ def find_part_error(
         if len(lost):
             raise _UnknownDisplacement(lost)
         every = [displaced] if division is None else [displaced, replace(displaced, division=division)]
-        solved = [as_nominal or solve_coupled(run, paths, one, nominal.lever) for one in every]
+        solved = list(
+            in_blocks(
+                lambda part: as_nominal or solve_coupled(run, paths, every[part.start], nominal.lever),
+                len(every),
+                1,
+            )
+        )
         sides = [
             _side(nominal, one, paths)
             if isinstance(forces, str)

@@ -166,6 +166,22 @@ CODES = define(
             action="Write the range in degrees.",
             example="--turn=-1.571:1.571 instead of --turn=-90:90.",
         ),
+        "PLC022": Code(
+            "warning",
+            "place reads as metres",
+            meaning="All lengths of a place or of the ranges are a few millimetres, which only metres explain.",
+            consequence="The part would lie in the foot of the robot.",
+            action="Write lengths in mm, as the help of the message states them.",
+            example="--x 0.85:1.65 instead of --x 850:1650.",
+        ),
+        "PLC023": Code(
+            "error",
+            "two places at one spot",
+            meaning="Two places for several parts have the same origin.",
+            consequence="Two parts would lie in each other.",
+            action="State each place once.",
+            example="--at a=50,950,1000 --at b=50,950,1000.",
+        ),
         "PLC015": Code(
             "info",
             "tool may turn along the path",

@@ -44,6 +44,11 @@ class Room:
         """(D,) the freedoms that are not fixed."""
         return np.flatnonzero(self.upper > self.lower)
 
+    @property
+    def stated(self) -> Ints:
+        """(K,) the freedoms that are not fixed where they are now."""
+        return np.flatnonzero((self.upper > self.lower) | (self.lower != self.present))
+
     def places(self, shares: Floats) -> Floats:
         """(P, 6) the placements at ``shares`` (P, D) of the ranges of the free ones."""
         return np.asarray(self._fill(shares))

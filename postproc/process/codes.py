@@ -320,6 +320,42 @@ FORCE_CODES = define(
             action="Use --force without a value for the forces of the comments.",
             example="`compensate panel.src --force 0,360,560`, with `;FORCE 0 280 0` in panel.src.",
         ),
+        "FRC040": Code(
+            "warning",
+            "stated forces contradict the stock",
+            meaning="Over all cuts these forces point elsewhere than those that follow from blank, tools and motions,"
+            " or are several times as large or small.",
+            consequence="If they are wrong, so is the correction: of a force with the other sign it doubles the error.",
+            action="Check sign (on the tool, not on the part), unit and frame of the forces, and blank and tools.",
+            example="A log of a dynamometer below the part: what it measures acts on the part.",
+        ),
+        "FRC036": Code(
+            "warning",
+            "mirrored obliquely to the spindle",
+            meaning="The program mirrors coordinates in a plane that is neither along nor across the spindle.",
+            consequence="On which side of the feed they cut is not known, and what depends on it is not corrected.",
+            action="Incline the tool along or across the mirrored axis, or state the forces @base or @tool.",
+            example="`G51.1 Y0.` with a tool that the cell inclines by 30 deg towards Y.",
+        ),
+        "FRC037": Code(
+            "warning",
+            "sideways force of mirrored motions",
+            meaning=(
+                "A force across the feed is stated @feed for motions whose coordinates the program mirrors: the spindle"
+                " is not mirrored, and neither this force nor its mirror image need be that of the cut."
+            ),
+            consequence="A force stated for the programmed side acts to the other one, and the correction is wrong.",
+            action="State the force of these motions @base or @tool, or a process, whose forces follow the mirror.",
+            example="`(FORCE 61 115 -22 @FEED)` before a motion under `G51.1 Y40.`.",
+        ),
+        "FRC039": Code(
+            "info",
+            "forces are multiplied by factors of the cell",
+            meaning="Forces of program, CSV or process file are multiplied by `force_factors` of the cell.",
+            consequence="The force that is used, and shown as the largest, is the product.",
+            action="Remove a factor that was learnt from another tool or material.",
+            example="`force_factors: {SLOT: {factor: 1.5}}`.",
+        ),
         "FRC033": Code(
             "error",
             "spindle turns counter-clockwise",
@@ -327,6 +363,54 @@ FORCE_CODES = define(
             consequence="Its forces are those of a spindle that turns clockwise: sideways they are opposite.",
             action="Check M3 and M4; state the force, or blank and tools, for which both directions are computed.",
             example="`S12000 M4` before a cut with `direction: down`.",
+        ),
+        "FRC041": Code(
+            "warning",
+            "operation differs from a comment",
+            meaning="The process file states another diameter for an operation than the comments of its tool.",
+            consequence="One of them is wrong: the forces and the correction may be.",
+            action="Correct the process file, or post the program for the tool that is used.",
+            example="`diameter: 8` for `(T1 D=16. CR=0. - ZMIN=-5. - flat end mill)`.",
+        ),
+        "FRC042": Code(
+            "warning",
+            "spindle speed differs from the operation's",
+            meaning="The process file states another speed of the spindle than the program.",
+            consequence="One of them is wrong: the feed per tooth, the forces and the correction may be.",
+            action="Correct `spindle` in the process file, or S in the program.",
+            example="`spindle: 12000` for a program with `S3000 M3`.",
+        ),
+        "FRC043": Code(
+            "warning",
+            "spindle is stopped in an operation",
+            meaning="An operation of the process file cuts after M5.",
+            consequence="A tool that does not turn breaks; the forces are those of one that does.",
+            action="Check M3 and M5.",
+            example="`M5` before the last pass.",
+        ),
+        "FRC044": Code(
+            "warning",
+            "feed per tooth of an operation is implausible",
+            meaning="The feed per tooth is that of no cutter: the limits are those of STK024.",
+            consequence="Feed or speed have probably another unit than stated, and the forces are as wrong.",
+            action="Compare F, its unit (G94, G95, mm, inches), `spindle` and `teeth` with the machine.",
+            example="`spindle: 200` (1/s) for F3600: 6 mm per tooth.",
+        ),
+        "FRC045": Code(
+            "warning",
+            "size of an operation's tool is implausible",
+            meaning="The cell states another diameter, or no tool of the stated size cuts what the operation does.",
+            consequence="Forces and corrections belong to another tool.",
+            action="State diameter and depth in mm, the diameter and not the radius, the spindle in 1/min.",
+            example="`diameter: 8` where the tool in the cell has `diameter: 16`.",
+        ),
+        "FRC046": Code(
+            "warning",
+            "force or coefficients of an operation are implausible",
+            meaning="The coefficients are those of no material, or force or power are beyond any robot.",
+            consequence="The correction is wrong by as much.",
+            action="State ktc, krc, kac in N/mm2 and kte, kre, kae in N/mm.",
+            example="`ktc: 0.78`: that is 780 N/mm2 in kN/mm2.",
         ),
     }
 )

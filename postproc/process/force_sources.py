@@ -12,6 +12,7 @@ import numpy as np
 from postproc.base.findings import Finding, Refusal
 from postproc.cell import Cell, MotionFrames
 from postproc.process.force_comments import marked_air, read_annotations
+from postproc.process.mirrored_cuts import sideways_findings
 from postproc.process.stated_forces import FORM, NotAForce, StatedForces, parse_force
 from postproc.process.stock.stated_stock import has_stock
 from postproc.process.wrenches import Wrenches, turn_to_robot_axes
@@ -131,17 +132,20 @@ class _ForceRequest:
             help = f"write {FORM}; or name a CSV or YAML file"
             raise Refusal(Finding("FRC002", message, file, line, help=help)) from None
         all_of_one = np.broadcast_to(np.int32(0), len(self.toolpath))
-        return StatedForces(np.array([values]), np.array([frame]), all_of_one), (), spec
+        stated = StatedForces(np.array([values]), np.array([frame]), all_of_one)
+        return stated, self.sideways(stated), spec
 
     def table(self, path: Path) -> SourcedForces:
         from postproc.base.tables import read_table  # these are loaded where there is a table
+        from postproc.base.tables.header_units import without_units
         from postproc.process.force_logs import read_log
-        from postproc.process.force_table import place_column, read_force_table
+        from postproc.process.force_table import UNITS_OF_COLUMNS, place_column, read_force_table
 
-        table = read_table(path, "FRC003")
+        table = without_units(read_table(path, "FRC003"), UNITS_OF_COLUMNS)
         column, program = place_column(table), str(self.program)
         if column == "line":
             stated, findings = read_force_table(table, self.toolpath, program, self.offset)
+            findings = (*findings, *self.sideways(stated))
         else:
             stated, findings = read_log(table, column, self.toolpath, self.frames, program, self.offset)
         return stated, findings, path.name
@@ -160,6 +164,10 @@ class _ForceRequest:
         stated, findings = process_forces(path, self.toolpath, self.frames, str(self.program))
         return stated, findings, path.name
 
+    def sideways(self, stated: StatedForces) -> tuple[Finding, ...]:
+        """FRC037 of forces that are stated, not measured where they act or computed."""
+        return sideways_findings(stated, self.toolpath, self.frames, str(self.program))
+
     def no_offset(self, why: str) -> None:
         """Refusal FRC020 where the offset of a log is to be taken off and there is no log."""
         if self.offset:
@@ -176,6 +184,7 @@ def _belonging(request: _ForceRequest, cell: Cell) -> SourcedForces:
     elsewhere = os.path.isfile(beside) or cell.process is not None or cell.force is not None
     if stated is not None and (stated.values.any() or not elsewhere):
         request.no_offset("the force comes from FORCE comments")
+        findings = (*findings, *request.sideways(stated))
         if os.path.isfile(beside):
             message = f"{beside.name} is not used: the FORCE comments of the program come first"
             findings = (

@@ -14,6 +14,12 @@ from postproc.process.wrenches import is_air
 from postproc.toolpath import Toolpath
 
 PLACES = ("line", "s_mm", "t_s")
+UNITS_OF_COLUMNS = {
+    **dict(zip((*PLACES, "frame"), ("", "mm", "s", ""), strict=True)),
+    **dict(zip(CHANNELS, 3 * ("N",) + 3 * ("N m",), strict=True)),
+}
+"""Column -> its unit."""
+
 FORM = (
     "line (of the motion, from 1) or s_mm (path length) or t_s (time at programmed feed), then fx,fy,fz[,mx,my,mz]"
     "[,frame] in N and N m"

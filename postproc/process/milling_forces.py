@@ -15,7 +15,7 @@ flutes do neither.  Source: Y. Altintas, Manufacturing Automation, mechanics of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,6 +45,10 @@ class Engagement:
     exit: float
     coefficients: Coefficients
 
+    def on_the_other_side(self) -> Engagement:
+        """The same cutter, turning the same, with the material at the other side of the feed: up is down milling."""
+        return replace(self, entry=np.pi - self.exit, exit=np.pi - self.entry)
+
 
 def engagement(direction: str, width: float, diameter: float) -> tuple[float, float]:
     """Entry and exit angle [rad] of a cutter that takes ``width`` of its ``diameter`` [m] at one side.
@@ -63,6 +67,14 @@ def mean_force(cut: Engagement, feed: Floats) -> Floats:
     """
     turning, steady = _shares(cut)
     return np.asarray(feed[:, None] * turning + steady)
+
+
+def mean_torque(cut: Engagement, feed: Floats) -> Floats:
+    """(N,) [N m] mean moment about the spindle that turns the tool, for the feeds per tooth ``feed`` (N,) [m]: that of
+    the tangential forces at the radius."""
+    tangential = cut.coefficients.cutting[0] * feed * (np.cos(cut.entry) - np.cos(cut.exit))
+    tangential = tangential + cut.coefficients.edge[0] * (cut.exit - cut.entry)
+    return np.asarray(0.5 * cut.diameter * cut.teeth * cut.depth / (2 * np.pi) * tangential)
 
 
 def force(cut: Engagement, feed: float, angle: Floats, discs: int = 200) -> Floats:

@@ -16,6 +16,8 @@ from postproc.cell import MotionFrames
 from postproc.process.feed_frames import ALONG_SPINDLE
 from postproc.process.force_comments import marked_air
 from postproc.process.milling_forces import mean_force, peak_share
+from postproc.process.mirrored_cuts import cut_sides, oblique_findings
+from postproc.process.operation_checks import check_operations
 from postproc.process.path_length import PathLength, shifted
 from postproc.process.process_file import Operation, read_process
 from postproc.process.stated_forces import FEED, StatedForces
@@ -35,8 +37,10 @@ def process_forces(
 
     Air, with no force, are: motions of no operation, point-to-point and rapid motions, those under FORCE OFF, at the
     operation's ``rapid`` and above, those that come from axis positions (approaches, with no known direction), and
-    those along the spindle axis (of plunges the model knows nothing).  Refusal: of the file; FRC011
-    where no operation has any motion; FRC013 where a feed is not known; FRC033 under M4.
+    those along the spindle axis (of plunges the model knows nothing).  Where the program mirrors the side that is cut,
+    the spindle turns as before: climb milling is conventional milling there.  Refusal: of the file; FRC011
+    where no operation has any motion; FRC013 where a feed is not known; FRC033 under M4.  Findings: also FRC041 to
+    FRC046, where an operation contradicts program, cell, or what tools and robots are.
     """
     operations = read_process(path)
     joined = join(operations, toolpath)
@@ -53,6 +57,10 @@ def process_forces(
         )
         findings.append(Finding("FRC014", what, program, int(toolpath.line[np.argmax(free)])))
     cutting &= ~free
+    side = cut_sides(toolpath, frames)
+    oblique = np.flatnonzero(cutting & (side == 0))
+    findings += oblique_findings(oblique, "have no computed force", toolpath, program)
+    cutting[oblique] = False
     back = np.flatnonzero(cutting & (toolpath.spindle < 0))
     if len(back):
         message = f"the spindle rotates counter-clockwise in {len(back)} cutting motions"
@@ -63,8 +71,12 @@ def process_forces(
     n = len(toolpath)
     values, row = [np.zeros((1, 6))], np.zeros(n, np.int32)
     ci95, peak, radius = np.full(n, np.nan), np.full(n, np.nan), np.full(n, np.nan)
-    for index, operation in enumerate(operations):
-        rows = np.flatnonzero(cutting & (joined == index))
+    motions = {
+        index: np.flatnonzero(cutting & (joined == index)) for index in np.unique(joined[cutting]).tolist()
+    }
+    acting = [(operations[index], rows[side[rows] > 0]) for index, rows in motions.items()]
+    acting += [(operations[index].as_mirrored(), rows[side[rows] < 0]) for index, rows in motions.items()]
+    for operation, rows in acting:
         if not len(rows):
             continue
         feed = operation.feed_per_tooth(toolpath.feed[rows])
@@ -79,6 +91,7 @@ def process_forces(
         radius[rows] = 0.5 * operation.cut.diameter
         ci95[rows] = np.nan if operation.material.ci95 is None else operation.material.ci95
         findings += _summary(operation, rows, feed, usual, share, toolpath, path, program)
+    findings += check_operations(operations, motions, toolpath, frames.diameters, path, program)
     stated = np.concatenate(values)
     return StatedForces(stated, np.full(len(stated), FEED), row, ci95=ci95, peak=peak, radius=radius), tuple(
         findings

@@ -54,7 +54,7 @@ class Operation:
     """One operation.  Joined by one of: ``name``, words of a comment; ``tool``, its number; ``lines``, first and last.
 
     speed [rad/s]; rapid [m/s]: motions at this feed and above are air (infinite: none); line: where it is in the
-    file.
+    file; mirrored: as it is where the program mirrors the side that it cuts.
     """
 
     name: str
@@ -65,13 +65,18 @@ class Operation:
     rapid: float
     material: Material
     line: int
+    mirrored: bool = False
 
     @property
     def label(self) -> str:
         """What the operation is called in messages."""
-        if self.name:
-            return repr(self.name)
-        return f"tool {self.tool}" if self.tool else f"lines {self.lines[0]} to {self.lines[1]}"
+        lines = f"lines {self.lines[0]} to {self.lines[1]}"
+        own = repr(self.name) if self.name else f"tool {self.tool}" if self.tool else lines
+        return f"{own} (mirrored)" if self.mirrored else own
+
+    def as_mirrored(self) -> Operation:
+        """The same where the program mirrors the side that it cuts, and the spindle turns as before."""
+        return replace(self, cut=self.cut.on_the_other_side(), mirrored=True)
 
     def feed_per_tooth(self, feed: float | np.ndarray) -> np.ndarray:
         """[m], of the shape of ``feed``, a scalar or (N,) [m/s]: feed / (turns per second x teeth)."""

@@ -324,7 +324,7 @@ class Diagnosed(Result):
             "residual_patterns_refitted": [_where(one) for one in self.patterns],
             "residual_patterns_final": [_where(one) for one in verdict.remainder],
             "gap": {key: gap.get(key) for key in GAP} | {"refitted_rms_mm": mm(self.rms["refitted"])},
-            "reduced_chi2": None if verdict.conditional else _finite(verdict.reduced_chi2),
+            "reduced_chi2": None if verdict.conditional else _finite(self.final.variance),
             "next_poses": None if self.next_poses is None else self.next_poses.poses,
             "next_poses_file": self.next_poses_file,
             "next_poses_between": None

@@ -34,9 +34,6 @@ KEY = 10
 PARAMETERS = 3
 """So many of an effect are in the paragraph, all in the table."""
 
-OVERSTATED = 0.5
-"""Variance over the stated one below which readings scatter by less than is stated."""
-
 WIDE = 1.5
 """Plausible sizes: an interval that is wider says that the readings do not distinguish a parameter from others."""
 
@@ -236,7 +233,7 @@ def _ordered(result: Diagnosed) -> Iterator[str]:
     """A drift that may as well be an effect of the poses."""
     readings = result.final.campaign.readings
     for named in result.verdict.named:
-        variable = named.candidate.effect.described().get("variable")
+        variable = named.candidate.effect.form().get("variable")
         values = {"time": readings.time, "temperature": readings.temperature}.get(str(variable))
         if values is not None and goes_with_poses(values, readings.q):
             yield (
@@ -372,7 +369,7 @@ def _rest(result: Diagnosed) -> Iterator[str]:
     residual = _mm(result.rms["after"])
     if result.verdict.conditional:
         return
-    if result.verdict.reduced_chi2 < OVERSTATED:
+    if result.final.is_overstated:
         yield (
             f"The residual, {residual} mm RMS, is clearly smaller than the scatter ({_mm(result.scatter)} mm, from:"
             f" {result.final.noise.source}): if that is overstated, it hides small effects."

@@ -66,6 +66,12 @@ def verdict(result: Identified) -> str:
         return (
             f"{sentence} Readings scatter by {scatter}: the model lacks an effect, or the scatter is larger."
         )
+    if after.times_stated:
+        each = f"{after.shared_error / MM:.3f} mm in each coordinate"
+        return (
+            f"{sentence} Readings scatter by {scatter}, and those of one pose share another {each}:"
+            " the model lacks an effect, or the robot does not come back to a pose any better."
+        )
     return f"{sentence} Readings scatter by {scatter}: they show nothing more."
 
 

@@ -135,7 +135,8 @@ class SingleFreedom:
 @dataclass(frozen=True)
 class FeedTurn:
     """What turning the feed about the vertical would change: of the whole path (``first`` 0) or of an operation, in
-    lines first to last of a program; before [m], angle [rad] of the best direction, after [m]."""
+    lines first to last of a program; before [m], angle [rad] of the best direction, after [m]: by the linear model of
+    the search, where listed places have the figures of the main job."""
 
     program: str
     operation: str
@@ -203,7 +204,7 @@ class Placement(Result):
 
     def as_json(self) -> dict[str, object]:
         """The machine-readable result; the keys are public."""
-        free = self.room.free.tolist()
+        stated = self.room.stated.tolist()
         result = {
             "programs": list(self.programs),
             "robot": self.robot,
@@ -219,7 +220,7 @@ class Placement(Result):
             "checked_places": self.checked,
             "room": {
                 KEYS[i]: [round(float(end[i] / UNITS[i]), 6) for end in (self.room.lower, self.room.upper)]
-                for i in free
+                for i in stated
             },
             "polygon_mm": None if self.room.polygon is None else np.round(self.room.polygon / MM, 6).tolist(),
             "limit_margin_deg": self.margins[0],
@@ -311,7 +312,7 @@ def facts(done: Placement) -> Iterator[tuple[str, str]]:
     inside = (
         f", inside a polygon of {len(done.room.polygon)} corners" if done.room.polygon is not None else ""
     )
-    ranges = ", ".join(_range(done.room, i) for i in done.room.free)
+    ranges = ", ".join(_range(done.room, i) for i in done.room.stated)
     yield "room", f"{ranges}{inside}" if ranges else "the part stays where it is"
     yield (
         "margins",
@@ -333,7 +334,8 @@ def facts(done: Placement) -> Iterator[tuple[str, str]]:
 
 def _range(room: Room, i: int) -> str:
     low, high = room.lower[i] / UNITS[i], room.upper[i] / UNITS[i]
-    return f"{FREEDOMS[i].replace('_', ' ')} {low:g} .. {high:g} {'deg' if UNITS[i] == DEG else 'mm'}"
+    ends = f"{low:g} .. {high:g}" if low < high else f"{low:g}"
+    return f"{FREEDOMS[i].replace('_', ' ')} {ends} {'deg' if UNITS[i] == DEG else 'mm'}"
 
 
 def tables(done: Placement) -> list[Table]:
@@ -342,16 +344,16 @@ def tables(done: Placement) -> list[Table]:
 
 
 def _places(done: Placement) -> Table:
-    free = done.room.free.tolist()
+    stated = done.room.stated.tolist()
     table = Table(box=None, pad_edge=False)
     table.add_column("")
-    heads = [FREEDOMS[i].replace("_", " ") for i in free]
+    heads = [FREEDOMS[i].replace("_", " ") for i in stated]
     heads += ["across mm", "max mm", "rms mm", "uncertain mm", "limit deg", "singular deg", "regret"]
     for head in heads:
         table.add_column(head, justify="right")
     rows = [("now", done.present), *((str(k + 1), one) for k, one in enumerate(done.places))]
     for name, one in rows:
-        place = [in_decimals(one.place[i] / UNITS[i], 2 if UNITS[i] == DEG else 1) for i in free]
+        place = [in_decimals(one.place[i] / UNITS[i], 2 if UNITS[i] == DEG else 1) for i in stated]
         bound = ">" if one.lower_bound else ""
         rough = "-" if math.isnan(one.score) else f"~{one.score / MM:.3f}"
         cells = [
@@ -383,7 +385,7 @@ def _alone(done: Placement) -> Table:
 
 def _feed(done: Placement) -> Table:
     table = Table(box=None, pad_edge=False)
-    for head in ("feed direction at the best place", "turn deg", "now mm", "turned mm"):
+    for head in ("feed direction at the best place", "turn deg", "now mm (linear)", "turned mm (linear)"):
         table.add_column(head, justify="left" if head.startswith("feed") else "right")
     for one in done.feed[:SHOWN_TURNS]:
         lines = f"lines {one.first} .. {one.last}"

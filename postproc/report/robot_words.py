@@ -67,7 +67,7 @@ def show_robot(console: Console, models: Sequence[StiffnessModel]) -> None:
         console.print(Text(_identified_words(run)))
     console.print()
     for term in model.terms:
-        options = ", ".join(f"{key} {value}" for key, value in term.effect.described().items())
+        options = ", ".join(f"{key} {_option(value)}" for key, value in term.effect.described().items())
         table = Table(
             title=f"{term.effect.name}{f' ({options})' if options else ''}",
             title_justify="left",
@@ -192,6 +192,10 @@ def _limits_words(robot: Robot) -> str:
         unit, word = (DEG, "") if joint.kind == "revolute" else (MM, " mm")
         words.append(f"{joint.name} {joint.lower / unit:g}..{joint.upper / unit:g}{word}")
     return "limits [deg]  " + "  ".join(words)
+
+
+def _option(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _vector(values: Floats) -> str:

@@ -352,6 +352,9 @@ def parameter_value(section: YamlSection, si_unit: str) -> Value:
     section.only("value", "unit", "ci95", "ci", "ci_level", "source")
     factor = unit_factor(section, si_unit)
     interval, level = None, None
+    if "ci95" in section and ("ci" in section or "ci_level" in section):
+        help = "keep ci95: for the half width of a 95 % interval, or ci: with ci_level: unstated"
+        raise section.error("YML004", "the interval is stated twice", "ci95", help)
     if "ci95" in section:
         interval, level = section.number("ci95", low=0.0) * factor, 0.95
     elif "ci" in section:

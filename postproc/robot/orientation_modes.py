@@ -47,7 +47,7 @@ def as_run(
         np.swapaxes(base.rotation[rows], 1, 2), product(product(turns, flange), tool.rotation[rows])
     )
     written = path.rotation[rows]
-    own[np.isnan(written[:, 0, 0])] = np.nan
+    own[np.isnan(path.position[rows, 0])] = np.nan
     rotation = path.rotation.copy()
     rotation[rows] = own
     lost = rows[np.isnan(own[:, 0, 0]) & np.isfinite(written[:, 0, 0])]

@@ -160,21 +160,38 @@ def fill_external_axes(
     unknown = [k for k in np.flatnonzero(path.moves_external).tolist() if k != own and k not in named]
     if unknown:
         raise Refusal(*(_unknown(path, k, file, cell) for k in unknown))
-    places = [_Place.of_axis(axis) for axis in axes if axis.kind != FIXED]
+    needed = needed_rows(path)
+    places = [
+        (_Place.of_axis(axis), needed & _matters(axis, axes, path)) for axis in axes if axis.kind != FIXED
+    ]
     if own is not None:
-        places.append(_Place.of_joint(robot, own, start))
+        places.append((_Place.of_joint(robot, own, start), needed))
     if not places:
         return path
-    needed = needed_rows(path)
     columns: dict[int, Floats] = {}
     refused = dict(path.constraints.refused)
-    for place in places:
+    for place, needed in places:
         values = place.fill(path.external[:, place.column])
         place.check(values, needed, path, file, cell)
         for row in np.flatnonzero(needed & np.isinf(values)).tolist():
             refused.setdefault(row, place.not_known(values[row], path, row, file))
         columns[place.column] = np.where(np.isfinite(values), values, np.nan)
     return path.with_columns(external=_with(path.external, columns)).with_refused(refused)
+
+
+def _matters(axis: ExternalAxis, axes: Sequence[ExternalAxis], path: Toolpath) -> Bools:
+    """(N,) motions whose place depends on ``axis``: of a positioner those in a base that it carries, and those before
+    them, from where these start."""
+    if axis.kind != POSITIONER:
+        return np.ones(len(path), np.bool_)
+    carried, names = set(axis.bases), {axis.name}
+    for _ in axes:
+        above = [other for other in axes if other.on in names]
+        names |= {other.name for other in above}
+        carried |= {base for other in above for base in other.bases}
+    on = np.array([*((frame.entry or 0) in carried for frame in path.frames), False])
+    own = on[path.base]
+    return np.asarray(own | np.append(own[1:], False))
 
 
 def follow_external_axes(

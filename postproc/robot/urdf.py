@@ -121,6 +121,13 @@ def _merged(path: Path, chain: list[_UrdfJoint]) -> Arm:
         at = at @ (joint.origin or Poses.identity())
         if joint.kind == "fixed":
             continue
+        if joint.kind not in MOVING:
+            raise _wrong(
+                path,
+                joint.line,
+                f"joint {joint.name}: the type {joint.kind!r} is not supported{nearest(joint.kind, MOVING)}",
+                f"use one of: {', '.join(('fixed', *MOVING))}",
+            )
         axis = np.array([1.0, 0.0, 0.0]) if joint.axis is None else joint.axis
         frame = Poses(frame_with_z(axis), np.zeros(3))
         if joint.mimic is not None:
@@ -195,14 +202,6 @@ def _parse(path: Path) -> tuple[list[_UrdfJoint], dict[str, int]]:
 
 def _joint(path: Path, line: int, words: dict[str, str], names: set[str]) -> _UrdfJoint:
     name, kind = _word(path, line, "joint", words, "name"), _word(path, line, "joint", words, "type")
-    if kind != "fixed" and kind not in MOVING:
-        allowed = ", ".join(("fixed", *MOVING))
-        raise _wrong(
-            path,
-            line,
-            f"joint {name}: the type {kind!r} is not supported{nearest(kind, MOVING)}",
-            f"use one of: {allowed}",
-        )
     if name in names:
         raise _wrong(path, line, f"joint {name!r} is defined twice")
     names.add(name)
@@ -222,9 +221,10 @@ def _detail(path: Path, line: int, joint: _UrdfJoint, tag: str, words: dict[str,
     elif tag == "axis":
         axis = _three(path, line, _word(path, line, tag, words, "xyz"))
         length = float(np.linalg.norm(axis))
-        if length < 1e-6:
+        if length >= 1e-6:
+            joint.axis = axis / length
+        elif joint.kind in MOVING:  # a fixed joint has none
             raise _wrong(path, line, f"joint {joint.name}: its axis has no direction")
-        joint.axis = axis / length
 
 
 def _mesh(path: Path, line: int, name: str) -> None:

@@ -127,7 +127,7 @@ CELL: dict[str, Schema] = {
                     "length_ci95": number("half width of the 95 % interval, mm", 0.0, LARGEST),
                     "walls": mapping(
                         {},
-                        about="operation, or others -> side of the feed, seen along the spindle, on which the wall is",
+                        about="operation, or others -> side of the programmed feed, along the spindle, of the wall",
                         patterns={".+": text(choices=[*WALL_SIDES])},
                     ),
                 },

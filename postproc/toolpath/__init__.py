@@ -9,6 +9,8 @@ from postproc.toolpath.orientation_control import OrientationControl, Orientatio
 from postproc.toolpath.partial_targets import PartialTargets
 from postproc.toolpath.planned_motions import Plan, Role
 from postproc.toolpath.program_comments import Annotation, ProgramComments
+from postproc.toolpath.reflections import Reflections
+from postproc.toolpath.stated_loads import StatedLoad
 from postproc.toolpath.targets import COMPUTED, LOST, FrameRef, Kind, Targets
 from postproc.toolpath.toolpath import Toolpath, external_at
 
@@ -30,7 +32,9 @@ __all__ = [
     "PartialTargets",
     "Plan",
     "ProgramComments",
+    "Reflections",
     "Role",
+    "StatedLoad",
     "Targets",
     "Toolpath",
     "external_at",

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.base.arrays import Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints
 from postproc.toolpath.columns import MotionColumns, column, not_given
 
 
@@ -44,6 +44,10 @@ class OrientationControl(MotionColumns):
 
     ``redundant_axis`` (N, 3): unit vector in tool axes about which the text does not state how the tool is turned (tool
     vectors, two rotary axes); NaN where it gives the whole orientation.
+    ``part_turn`` (N, 3) [rad]: A, B, C by which the part is turned under the tool at the end of the motion, about axes
+    that nothing states; NaN where they do not turn it, or are not known.
+    ``in_machine`` (N,): the text states the orientation in the axes of the machine, which are taken for those of the
+    base.
     ``programmed`` (N, 3, 3): the rotations of the text, where those of the toolpath are what the controller runs
     instead; None where they are the same.
     """
@@ -55,6 +59,8 @@ class OrientationControl(MotionColumns):
     rotary_from: Floats = field(default_factory=not_given, metadata=column(3, default=np.nan))
     rotary_to: Floats = field(default_factory=not_given, metadata=column(3, default=np.nan))
     redundant_axis: Floats = field(default_factory=not_given, metadata=column(3, default=np.nan))
+    part_turn: Floats = field(default_factory=not_given, metadata=column(3, default=np.nan))
+    in_machine: Bools = field(default_factory=not_given, metadata=column(dtype=np.bool_, default=False))
     programmed: Floats | None = None
 
     @cached_property

@@ -35,7 +35,8 @@ class FrameRef:
     ``line`` is where it was set, for messages.  ``declared``: what the controller's own file states of a frame whose
     ``pose`` the program does not state; the cell's base or tool of that number comes first.
     ``in_entry``: (number, pose) of a frame that the program states in such an entry (``BASE_DATA[2]:{X 10 ...}``):
-    ``number`` and ``pose`` are None then, and ``declared`` is that of the entry.
+    ``number`` and ``pose`` are None then, and ``declared`` is that of the entry.  ``load``: mass [kg] of a tool and its
+    centre [m] in flange axes where the program, or the controller's own file, states them.
     """
 
     number: int | None
@@ -43,6 +44,7 @@ class FrameRef:
     line: int = 0
     declared: Poses | None = None
     in_entry: tuple[int, Poses] | None = None
+    load: tuple[float, float, float, float] | None = None
 
     @property
     def entry(self) -> int | None:

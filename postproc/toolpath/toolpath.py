@@ -26,6 +26,8 @@ from postproc.toolpath.motion_speeds import MotionSpeeds
 from postproc.toolpath.orientation_control import OrientationControl, OrientationMode
 from postproc.toolpath.partial_targets import PartialTargets
 from postproc.toolpath.program_comments import Annotation, ProgramComments
+from postproc.toolpath.reflections import Reflections
+from postproc.toolpath.stated_loads import StatedLoad
 from postproc.toolpath.targets import LOST, FrameRef, Kind, Targets
 
 STATED_BY_ALL = ("targets", "speeds", "sequence", "remarks")
@@ -36,7 +38,8 @@ STATED_BY_ALL = ("targets", "speeds", "sequence", "remarks")
 class Toolpath(MotionColumns):
     """N motions in the order of the text.
 
-    ``line`` (N,): from 1.  All else is in parts; the columns that every motion states can be asked for here, too.
+    ``line`` (N,): from 1.  ``stated_loads``: what the program states of the load.  All else is in parts; the columns
+    that every motion states can be asked for here, too.
     """
 
     targets: Targets
@@ -49,6 +52,8 @@ class Toolpath(MotionColumns):
     orientation_control: OrientationControl = field(default_factory=OrientationControl)
     configuration: Configuration = field(default_factory=Configuration)
     remarks: ProgramComments = field(default_factory=ProgramComments)
+    reflections: Reflections = field(default_factory=Reflections)
+    stated_loads: tuple[StatedLoad, ...] = ()
 
     def __post_init__(self) -> None:
         n = len(self.targets.kind)

@@ -12,7 +12,7 @@ from postproc.base.batches import each_block
 from postproc.base.geometry import lengths, turn_between
 from postproc.base.units import MM
 from postproc.compensation.problem import CompensationProblem
-from postproc.toolpath import Kind, Toolpath
+from postproc.toolpath import Kind, Toolpath, external_at
 from postproc.verification.pairing import SAME
 from postproc.verification.path_samples import PathSamples
 from postproc.verification.run_path import RunPath
@@ -151,7 +151,12 @@ def _new_stops(
     if original.constraints.exact_stays:
         inside &= ~stops(original)[samples.place.row[motions.end]]
     rests = motions.row[stops(run.toolpath)[motions.row] & inside]
-    may = end_rows(simulator, samples)[stops(original)]
+    place, end = samples.place, motions.end
+    # several motions may end at one place, where one only turns the tool
+    row, share, rest = place.row[end], place.share[end], stops(original)
+    length = simulator.original.desired_path.length[row]
+    at_end = rest[row] & ((1.0 - share) * length <= NEAR)
+    may = np.append(end_rows(simulator, samples)[stops(original)], motions.row[at_end])
     return [
         Difference(int(row), True, "the motion stops where the original flows")
         for row in np.setdiff1d(rests, may)
@@ -161,7 +166,19 @@ def _new_stops(
 def missing(simulator: Simulator, samples: PathSamples) -> list[Difference]:
     """Motions of the original at whose end none of the program ends; of a program that is within the tolerance."""
     what = "no motion of the output ends where this motion ends"
-    return [Difference(int(row), False, what) for row in _missing(simulator, samples)]
+    rows = np.union1d(_missing(simulator, samples), _unfinished(simulator, samples))
+    return [Difference(int(row), False, what) for row in rows]
+
+
+def _unfinished(simulator: Simulator, samples: PathSamples) -> Ints:
+    """Rows of the original that only move external axes at one place, and to whose end no motion moves them."""
+    path = simulator.original.toolpath
+    rows = np.flatnonzero(simulator.grid.on_the_spot)
+    way = np.abs(external_at(path, rows, np.ones(len(rows))) - external_at(path, rows, np.zeros(len(rows))))
+    way = np.nan_to_num(way).max(axis=1, initial=0.0)
+    reached, end = np.zeros(len(path)), np.flatnonzero(samples.end)
+    np.maximum.at(reached, samples.place.row[end], samples.place.share[end])
+    return np.asarray(rows[(1.0 - reached[rows]) * way > SAME_EXTERNAL])
 
 
 def _missing(simulator: Simulator, samples: PathSamples) -> Ints:

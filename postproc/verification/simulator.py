@@ -50,16 +50,22 @@ SEARCHES = 8
 class Simulation:
     """A program along the original's cuts.
 
-    samples; change [m], change_angle [rad]: what the last doubling of the samples changed of the largest error; missed
-    [m]: the largest distance of an end point of the original from the path of the tool; approaches (K,): rows that lead
-    from where a cut starts in the original to where it starts corrected, or back, in air; approach_length [m]; points
-    (P,): rows of the program whose end point alone is looked at, point_rows (P,) those of the original, point_error
-    (P,) [m] and point_turn (P,) [rad] theirs; added (A,): rows before such points without a counterpart; unknown:
-    vertices that are passed at a distance that is not known, taken as they are programmed; skipped: motions under force
-    that cannot be simulated.
+    samples; start, stop (K,): its rows in the place of each stretch, without ``approaches``; fixed, fixed_rows (F,):
+    rows of the program and of the original, of stretches without a known path, that correspond one to one; change [m],
+    change_angle [rad]: what the last doubling of the samples changed of the largest error; missed [m]: the largest
+    distance of an end point of the original from the path of the tool; approaches (K,): rows that lead from where a cut
+    starts in the original to where it starts corrected, or back, in air; approach_length [m]; points (P,): rows of the
+    program whose end point alone is looked at, point_rows (P,) those of the original, point_error (P,) [m] and
+    point_turn (P,) [rad] theirs; added (A,): rows before such points without a counterpart; unknown: vertices that are
+    passed at a distance that is not known, taken as they are programmed; skipped: motions under force that cannot be
+    simulated.
     """
 
     samples: PathSamples
+    start: Ints
+    stop: Ints
+    fixed: Ints
+    fixed_rows: Ints
     change: float
     change_angle: float
     missed: float
@@ -123,8 +129,13 @@ class Simulator:
         alone = ~has_length & ~(cuts.air & turned)
         points, wanted, error, turn = self._points(run, first, last)
         samples, change, change_angle = self._dense(run, path, first[has_length], last[has_length], step)
+        fixed = [self._lone(first, last), *self._air(first, last)]
         return Simulation(
             samples,
+            first,
+            last,
+            np.concatenate([part[1] for part in fixed]),
+            np.concatenate([part[0] for part in fixed]),
             change,
             change_angle,
             self._missed(samples),
@@ -188,13 +199,19 @@ class Simulator:
             )
         return pairs
 
+    def _lone(self, first: Ints, last: Ints) -> tuple[Ints, Ints]:
+        """Rows of the stretches under force of which the end points alone count, and those of the run."""
+        cuts = self.pairing.stretches
+        lone = ~cuts.length & ~cuts.air
+        return _rows(cuts.start[lone], cuts.stop[lone]), _rows(
+            (last - cuts.stop + cuts.start)[lone], last[lone]
+        )
+
     def _points(self, run: CompensationProblem, first: Ints, last: Ints) -> tuple[Ints, Ints, Floats, Floats]:
         """Rows of the run whose end points alone are looked at, those of the original, and how far these are off [m]
         and turned [rad]."""
         original, cuts = self.original, self.pairing.stretches
-        lone = np.flatnonzero(~cuts.length & ~cuts.air)
-        wanted = [_rows(cuts.start[lone], cuts.stop[lone])]
-        rows = [_rows((last - cuts.stop + cuts.start)[lone], last[lone])]
+        wanted, rows = ([part] for part in self._lone(first, last))
         if not original.process:  # in air as well, every target is corrected
             path = original.toolpath
             in_air = np.concatenate([self.pairing.air, *(part[0] for part in self._air(first, last))])

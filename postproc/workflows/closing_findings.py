@@ -15,6 +15,7 @@ from postproc.output.write import (
 )
 from postproc.toolpath import Kind, OrientationPath, Role, Toolpath
 from postproc.workflows.corner_findings import corner_findings
+from postproc.workflows.missing_points import why_no_more_points
 from postproc.workflows.preparation import Prepared, Request
 
 
@@ -212,7 +213,8 @@ def _between(request: Request, ready: Prepared, written: WrittenProgram) -> list
                 f" here), tolerance"
                 f" {limit / unit:g} {word} ({int(over.sum())} motions)"
             )
-            help = _POLE if unit == DEG and _by_pair(path, row) else _NO_POINT
+            by_pair = unit == DEG and _by_pair(path, row)
+            help = _POLE if by_pair else why_no_more_points(request, ready, written.division, row)
             findings.append(Finding("COR006", message, str(request.program), int(path.line[row]), help=help))
     return findings
 
@@ -231,11 +233,6 @@ def _inserted(division: Subdivision, count: int) -> str:
         f"the output has {counts} (the first one here): {len(division) / max(count, 1):.3f} times the motions"
     )
 
-
-_NO_POINT = (
-    "no point may be inserted there (--no-insert, max_growth, min_segment, a spline, a TRIGGER), or the start of the"
-    " motion is not known"
-)
 
 _POLE = (
     "near the pole of two rotary axes the outer one hardly rotates the tool: it stays within"

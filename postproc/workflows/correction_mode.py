@@ -13,15 +13,19 @@ from postproc.base.units import DEG, MM
 from postproc.cell import Cell
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.touched_off import TouchedOff
-from postproc.effects import ComplianceLaw
+from postproc.effects import ComplianceLaw, Offset
 from postproc.effects.thermal_growth import ThermalGrowth
 from postproc.model import EffectInstance, StiffnessModel
-from postproc.toolpath import Kind
+from postproc.toolpath import Kind, Toolpath
+from postproc.workflows.tool_weights import weight_findings
 
 GROUPS = {"geometric": "geometry", "weight": "weights", "gear": "lost motion", "elastic": "static torques"}
 """Family of an effect -> what people call what it does to a robot without load."""
 
 TEMPERATURE = "temperature"
+
+SIDE_BY_WEIGHTS = "the side of a gap that weights choose"
+"""What lost motion is without a machining force, beside the direction of motion, which is corrected."""
 
 
 def corrected_model(full: StiffnessModel, cell: Cell) -> StiffnessModel:
@@ -195,8 +199,9 @@ def _touched_finding(task: CompensationProblem, touched: TouchedOff, frame: int)
 # what is excluded
 
 
-def mode_findings(full: StiffnessModel, cell: Cell, file: str) -> list[Finding]:
-    """The effects of the robot file ``full`` that are not corrected, and why."""
+def mode_findings(full: StiffnessModel, cell: Cell, program: Toolpath, file: str) -> list[Finding]:
+    """The effects of the robot file ``full`` that are not corrected, and why; weights that the tools of the ``program``
+    have and no effect counts."""
     acting = [term for term in full.terms if _acts_unloaded(term, cell)]
     if cell.correct == "process":
         return _excluded_by_process(full, acting, cell, file)
@@ -206,7 +211,7 @@ def mode_findings(full: StiffnessModel, cell: Cell, file: str) -> list[Finding]:
         message = f"the controller corrects these, as the cell states: {_in_groups(by_controller)}"
         findings.append(Finding("COR030", message, file))
     thermal = [t for t in acting if isinstance(t.effect, ThermalGrowth)]
-    by_temperature = [t for t in thermal if t.effect.described()["variable"] == "temperature"]
+    by_temperature = [t for t in thermal if t.effect.form()["variable"] == "temperature"]
     path, line = str(cell.path), cell.temperature_line
     if cell.temperature is not None and not by_temperature:
         message = (
@@ -219,13 +224,17 @@ def mode_findings(full: StiffnessModel, cell: Cell, file: str) -> list[Finding]:
     if len(thermal) > len(by_temperature):
         message = "thermal_growth by time is not corrected: the time of a run is not known"
         findings.append(Finding("COR031", message, path))
-    return findings
+    return findings + weight_findings(full, cell, program, file)
 
 
 def _excluded_by_process(
     full: StiffnessModel, acting: Sequence[EffectInstance], cell: Cell, file: str
 ) -> list[Finding]:
-    words = _in_groups(acting)
+    # an offset by direction alone has no middle that would stay: it is corrected
+    words = _in_groups(
+        [term for term in acting if not (term.effect.by_direction and isinstance(term.effect, Offset))]
+    )
+    words = words.replace(GROUPS["gear"], SIDE_BY_WEIGHTS)
     if full.robot.nominal is not full.robot.arm:
         words += (", " if words else "") + "geometry that differs from the controller's"
     findings = []

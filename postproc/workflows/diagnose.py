@@ -15,17 +15,18 @@ from postproc.diagnosis.accidents import are_accidents, far_readings, loaded_joi
 from postproc.diagnosis.approach_sides import diagnose_sides
 from postproc.diagnosis.diagnosis import Diagnosis, diagnose
 from postproc.diagnosis.search import model_unknowns
-from postproc.identification.campaign import Campaign
+from postproc.identification.campaign import Campaign, sense_of
 from postproc.identification.other_arm import check_arm
 from postproc.identification.sanity_checks import check_fit, check_numbers
 from postproc.identification.validation import held_out, validated
-from postproc.measurements import measurements_csv, read_measurements
+from postproc.measurements import Readings, measurements_csv
 from postproc.output.atomic_write import write_atomically
 from postproc.report.diagnosed import HANGS, Diagnosed, ValidatedFile, diagnosed_csv
 from postproc.report.report import json_bytes
 from postproc.report.residuals import Sizes, lengths_of
 from postproc.robot.description import Robot
-from postproc.workflows.identify import Measured, measured_of
+from postproc.workflows.growth_reference import growth_findings
+from postproc.workflows.identify import Measured, measured_of, validation_readings
 from postproc.workflows.next_poses import hung_weights, next_poses, within_payload
 from postproc.workflows.preparation import Stage, silent
 from postproc.workflows.readings_request import ReadingsRequest, spare_inputs
@@ -66,16 +67,18 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
     stage("reading")
     measured = measured_of(request.data, request.robot, request.tool_mm_deg)
     campaign, model = measured.campaign, measured.model
+    to_predict = [validation_readings((path,), measured) for path in request.validate]
     own = model_unknowns(model)
     check_numbers(measured.readings, (), model)
     bad = check_fit(campaign, model, own)
     if bad and not campaign.readings.deflection:
         stage("checking the arm")
         check_arm(campaign, model)
-    findings = [*measured.findings, *bad]
+    findings = [*measured.findings, *(finding for one in to_predict for finding in one.findings), *bad]
     diagnosis, sides = diagnose_sides(campaign, model, stage)
     findings += sides
     struck, wild = campaign_of(diagnosis), far_readings(diagnosis.final)
+    ordered = np.array_equal(sense_of(struck.readings), sense_of(measured.readings))
     if wild and not are_accidents(struck, wild):
         diagnosis = _beside_others(diagnosis)
     elif wild:
@@ -99,6 +102,7 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
         ]
         campaign = diagnosis.final.campaign
     findings += _searched(diagnosis, request.data[0])
+    findings += growth_findings(diagnosis.final.model, measured.readings, to_predict)
     stage("leaving poses out")
     folds = min(FOLDS, campaign.poses)
     residuals = held_out(diagnosis.stated, folds), held_out(diagnosis.final, folds)
@@ -122,7 +126,10 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
         outputs=(),
         strict=request.strict,
         load_limits=_load_limits(request, measured),
-        validation=tuple(_validated(path, measured, diagnosis) for path in request.validate),
+        validation=tuple(
+            _validated(path, readings, measured, diagnosis, ordered)
+            for path, readings in zip(request.validate, to_predict, strict=True)
+        ),
     )
     return _published(request, measured, result, stage)
 
@@ -159,13 +166,14 @@ def _load_limits(request: DiagnoseRequest, measured: Measured) -> tuple[str, ...
     return tuple(words)
 
 
-def _validated(path: Path, measured: Measured, diagnosis: Diagnosis) -> ValidatedFile:
-    """What the robot file and the final model predict of the readings of a file that was not diagnosed."""
-    readings = read_measurements(path, list(measured.readings.joints))
-    if readings.deflection != measured.readings.deflection:
-        raise Refusal(Finding("MEA008", "the file is of another kind than the diagnosed data", str(path)))
+def _validated(
+    path: Path, readings: Readings, measured: Measured, diagnosis: Diagnosis, ordered: bool
+) -> ValidatedFile:
+    """What the robot file and the final model predict of the readings of a file that was not diagnosed; ``ordered``:
+    joints came to their places in the order of the rows."""
     if readings.direction is None:
-        readings = replace(readings, direction=np.zeros_like(readings.q))
+        sides = sense_of(readings) if ordered else np.zeros_like(readings.q)
+        readings = replace(readings, direction=sides)
     campaign = Campaign(readings, measured.campaign.stated_tool)
     check_numbers(readings, (), measured.model)
     check_fit(campaign, diagnosis.final.model, ())

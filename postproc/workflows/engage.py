@@ -21,6 +21,7 @@ from postproc.report.report import exit_code, in_order_of_place, json_bytes
 from postproc.robot.description import find_robot, load_robot
 from postproc.robot.external_axes import External
 from postproc.workflows.preparation import Request, Stage, cell_of, completed, read_program, silent
+from postproc.workflows.reading_findings import reader_findings
 
 _PARTS = {CUTTING: "cutter", SHANK: "shank", HOLDER: "holder"}
 
@@ -90,14 +91,13 @@ def _engage(request: EngageRequest, inputs: Inputs, stage: Stage) -> Engaged:
             by_tool[cutter.number] = (
                 len(rows),
                 float(cut.volume[rows].sum() / MM**3),
-                float(cut.depth[rows].max() / MM),
-                float(cut.width[rows].max() / MM),
+                *(cut.most[rows].max(axis=0) / MM).tolist(),
                 float(largest[rows].max()),
             )
     ci95 = run.ci95[cut.cuts]
     findings = in_order_of_place(
         [
-            *program.findings,
+            *reader_findings(program, path),
             *run.findings,
             *unknown_forces(run, path, str(request.program), "STK015"),
         ]

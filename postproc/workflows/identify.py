@@ -23,12 +23,15 @@ from postproc.identification.outliers import Outlier, outliers
 from postproc.identification.sanity_checks import check_fit, check_numbers
 from postproc.identification.unknowns import FitRequest, asked_for, with_gauge
 from postproc.identification.validation import WIDER, Bootstrap, Validation, bootstrap, held_out, validated
-from postproc.measurements import Readings, joined, read_measurements, robot_named
+from postproc.measurements import Readings, joined, not_fitted, read_measurements, robot_named
+from postproc.measurements.header_comments import in_metres
+from postproc.measurements.write_csv import pose_text
 from postproc.model import StiffnessModel
 from postproc.output.atomic_write import write_atomically
 from postproc.report.identified import STRONG, Identified, identified_csv
 from postproc.report.report import json_bytes
 from postproc.robot.description import Robot, find_robot, load_robot, robot_files
+from postproc.workflows.growth_reference import counted_from, growth_findings
 from postproc.workflows.kinds import check_kind
 from postproc.workflows.preparation import Stage, silent
 from postproc.workflows.readings_request import ReadingsRequest, spare_inputs
@@ -88,12 +91,13 @@ def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress
     campaign, model = measured.campaign, measured.model
     asked = asked_for(model, request.effects, request.priors)
     asked = replace(asked, unknowns=with_gauge(asked.unknowns))
+    validating = validation_readings(request.validate, measured) if request.validate else None
     check_numbers(measured.readings, asked.unknowns, asked.model)
     stage("comparing")
     bad = check_fit(campaign, asked.model, asked.unknowns)
     if bad:
         check_arm(campaign, asked.model)
-    findings = [*measured.findings, *bad]
+    findings = [*measured.findings, *bad, *(validating.findings if validating else ())]
     every = np.ones(len(campaign), bool)
     stage("registering")
     before = fit(campaign, model, (), every)
@@ -122,9 +126,11 @@ def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress
         stage("bootstrap")
         drawn = bootstrap(after, draws, lambda done, of: progress("bootstrap", done, of))
     validation = None
-    if request.validate:
+    if validating is not None:
         stage("validating")
-        validation = _validated(request, measured, before, after)
+        validation = _validated(validating, measured, before, after)
+    predicted = () if validating is None else (validating,)
+    findings += growth_findings(after.model, measured.readings, predicted)
     findings += _result(measured, asked, after, detected, request.drop_outliers, drawn, validation, residuals)
     result = Identified(
         robot=measured.robot.name,
@@ -161,7 +167,7 @@ def measured_of(
     described = load_robot(find_robot(robot or _known(named, data[0])))
     joints = [(joint.name, joint.kind != "revolute") for joint in described.joints]
     several = [read_measurements(path, joints) for path in data]
-    readings = several[0] if len(several) == 1 else joined(several)
+    readings = joined(several)
     findings = list(readings.findings)
     if (
         robot is not None
@@ -182,9 +188,14 @@ def measured_of(
     tool = None
     if tool_mm_deg is not None:
         six = [*tool_mm_deg, 0.0, 0.0, 0.0][:6]
+        findings += in_metres("--tool", six[:3], str(data[0]))
         tool = Poses.from_abc(np.array(six[:3]) * MM, np.array(six[3:]) * DEG)
-    campaign = Campaign(readings, tool)
+        if readings.tool is not None and pose_text(readings.tool) != pose_text(tool):
+            message = f"--tool is ignored: the readings state the tool {pose_text(readings.tool)}"
+            findings.append(Finding("IDN036", message, str(data[0])))
     model = StiffnessModel.from_robot(described)
+    readings = counted_from(readings, model)
+    campaign = Campaign(readings, tool)
     mounting = check_mounting(campaign, model)
     if mounting.readings is not readings:
         readings, campaign = mounting.readings, Campaign(mounting.readings, tool)
@@ -237,14 +248,19 @@ def _no_parameter_identified(measured: Measured, after: Fit) -> Finding:
     )
 
 
-def _validated(request: IdentifyRequest, measured: Measured, before: Fit, after: Fit) -> Validation:
+def validation_readings(paths: Sequence[Path], measured: Measured) -> Readings:
+    """Readings of files that a fit is to predict.  Raises Refusal MEA008 where they are those of ``measured``, of
+    another robot, or of another kind."""
+    for path in paths:
+        check_kind(path)
     joints = list(measured.readings.joints)
-    several = [read_measurements(path, joints) for path in request.validate]
-    readings = several[0] if len(several) == 1 else joined(several)
+    readings = not_fitted(joined([read_measurements(path, joints) for path in paths]), measured.readings)
     if readings.deflection != measured.readings.deflection:
-        raise Refusal(
-            Finding("MEA008", "the file is of another kind than the fitted data", str(request.validate[0]))
-        )
+        raise Refusal(Finding("MEA008", "the file is of another kind than the fitted data", str(paths[0])))
+    return replace(readings, reference=measured.readings.reference, start=measured.readings.start)
+
+
+def _validated(readings: Readings, measured: Measured, before: Fit, after: Fit) -> Validation:
     campaign = Campaign(readings, measured.campaign.stated_tool)
     check_numbers(readings, (), after.model)
     check_fit(campaign, after.model, ())
@@ -343,13 +359,15 @@ def _result(
             Finding("IDN028", "the tracker is at another place", str(validation.campaign.readings.files[0]))
         )
     if after.weights.shared > 0:
-        findings.append(
-            Finding(
-                "IDN029",
-                f"the readings of a pose share an error of {after.shared_error / MM:.3g} mm in each coordinate",
-                file,
-            )
+        code, message = (
+            "IDN029",
+            f"the readings of a pose share an error of {after.shared_error / MM:.3g} mm in each coordinate",
         )
+        if after.times_stated:
+            code = "IDN039"
+            times = f"{after.times_stated:.1f} times the scatter, which is {after.noise.source}"
+            message += f", and the residuals are {times}"
+        findings.append(Finding(code, message, file))
     unstated = [u.name for u in asked.unknowns if u.prior is not None and u.stated and u.stated.level is None]
     if unstated:
         findings.append(

@@ -18,11 +18,12 @@ from postproc.base.units import MM
 from postproc.learning.attribution import Attribution, attribute
 from postproc.learning.ball_displacement import BallDisplacement
 from postproc.learning.causes import CausePrediction, PriorKnowledge
+from postproc.learning.copied_parts import refuse_copied_parts
 from postproc.learning.history import RecordedStep
 from postproc.learning.measured_part import MeasuredPart, read_measured_part
 from postproc.learning.next_program import force_factors, learned_error, wall_sides
 from postproc.learning.other_readings import StatedPart, check_readings
-from postproc.learning.plausible import FirstLook, check_deviations, check_explained
+from postproc.learning.plausible import FirstLook, check_deviations, check_explained, scatter_findings
 from postproc.learning.promise import Promise, measured_rms, promise
 from postproc.learning.push_test import with_push_test
 from postproc.learning.unobserved import indistinct
@@ -46,7 +47,7 @@ from postproc.workflows.learn_history import (
 )
 from postproc.workflows.learn_points import CutProgram, Matched, match, read_job
 from postproc.workflows.learn_robot import force_factor_lines, learned_robot_file
-from postproc.workflows.learn_tool import tool_and_base_findings, tool_error_lines, tool_errors
+from postproc.workflows.learn_tool import MeasuredWalls, tool_and_base_findings, tool_error_lines, tool_errors
 from postproc.workflows.preparation import LearnedInputs, Request, Stage, silent
 from postproc.workflows.program import compensate
 
@@ -94,6 +95,7 @@ def _learn(request: LearnRequest, stage: Stage) -> Learned:
     record = request.history or record_path(job, main.program)
     remembered = remember(job, main, named, record, request.new_history, _folder(request))
     parts = remembered.parts
+    refuse_copied_parts(parts)
     known = known_before(request, job)
     programs = [cutting_file(main.program, part, remembered.kept)[1] for part in parts]
     stage("matching points to motions")
@@ -270,6 +272,7 @@ def _findings(
         size = float(np.sqrt(np.mean(result.by_field**2)))
         message = f"a smooth error of {size / MM:.3f} mm RMS has no name; it is corrected at this place only"
         findings.append(Finding("LRN010", message, file))
+    findings += scatter_findings(result, file)
     words = indistinct(result)
     if words:
         findings.append(Finding("LRN008", words, file))
@@ -286,6 +289,16 @@ def _no_better(promised: Promise, file: str) -> Finding:
     return Finding("LRN009", message, file)
 
 
+def _walls(result: Attribution, job: CutProgram) -> MeasuredWalls:
+    task, path, names = job.ready.task, job.ready.task.toolpath, np.array(job.operations.names)
+    hand = path.reflections.sides(path.rotation, job.spindle)
+    sides = wall_sides(result, task.desired_path, job.operations, job.tool, job.ball, hand)
+    cut = {
+        number: job.operations.which[task.carries & (job.tool == number)] for number in np.unique(job.tool)
+    }
+    return MeasuredWalls(sides, {int(k): frozenset(names[which].tolist()) for k, which in cut.items()})
+
+
 def _learned_inputs(job: CutProgram, matched: Matched, result: Attribution) -> LearnedInputs:
     """What the main job is given beside the robot file."""
     task, factors = job.ready.task, force_factors(result)
@@ -296,8 +309,7 @@ def _learned_inputs(job: CutProgram, matched: Matched, result: Attribution) -> L
 
     rigid = matched.centre, matched.axes
     corners = corner_error(job, result, forces(task.force))
-    path = task.desired_path
-    errors = tool_errors(result, job.ready.cell, wall_sides(result, path, job.operations, job.tool, job.ball))
+    errors = tool_errors(result, job.ready.cell, _walls(result, job))
     flat = {k: replace(one, radius=0.0) if k in job.ball else one for k, one in errors.items()}
     tool = tool_displacement(flat, task, job.spindle, job.tool, job.operations)
     radius = {k: one.radius for k, one in errors.items() if k in job.ball and one.radius}
@@ -329,8 +341,7 @@ def _published(
         files[robot_path] = content
     if factors:
         files[folder / f"{main.program.stem}.force_factors.yaml"] = factors
-    sides = wall_sides(result, job.ready.task.desired_path, job.operations, job.tool, job.ball)
-    if tools := tool_error_lines(result, parts, job.ready.cell, sides):
+    if tools := tool_error_lines(result, parts, job.ready.cell, _walls(result, job)):
         files[folder / f"{main.program.stem}.tool_errors.yaml"] = tools
     own = folder / f"{main.program.stem}.learned.json"
     extra = [path for path in (request.csv, request.page, request.json) if path is not None]

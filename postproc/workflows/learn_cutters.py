@@ -13,7 +13,7 @@ from postproc.learning import codes as codes
 from postproc.process.stock.cutters import Cutter
 from postproc.process.stock.stated_stock import has_stock
 from postproc.process.stock.stock_section import read_stock_process
-from postproc.process.stock.tool_comments import CommentedTool, read_tool_comments
+from postproc.process.tool_comments import CommentedTool, read_tool_comments
 from postproc.workflows.preparation import Prepared
 
 SAME = 1e-6

@@ -28,7 +28,7 @@ from postproc.learning.causes import (
 from postproc.learning.covariance import FREE_SHIFT, FREE_TURN, Layout
 from postproc.learning.measured_part import FREEDOMS, MeasuredPart
 from postproc.learning.next_program import FeedTurns
-from postproc.learning.plausible import FEW_BESIDE, TOUCHED, check_contacts, check_nominal, check_shift
+from postproc.learning.plausible import FEW_BESIDE, TOUCHED
 from postproc.learning.touched_points import TouchedPoints, touched_points
 from postproc.part.contact import Contacts, CuttingMotions, find_contacts
 from postproc.process.operation_names import OperationNames
@@ -37,10 +37,14 @@ from postproc.workflows.cell_force_factors import operations_of
 from postproc.workflows.cell_tool_errors import tool_numbers
 from postproc.workflows.learn_commands import commands_at, cutting_program
 from postproc.workflows.learn_cutters import cutters_of
+from postproc.workflows.learn_misplaced import PlacedPart, misplaced_findings
 from postproc.workflows.preparation import Prepared, Request, prepare
 
-WIDE = 2 * MM
-"""Distance at which a point is still compared with the surface, to see whether it is a measured place, or shifted."""
+FACING = np.cos(np.radians(30.0))
+"""Cosine between the normals of surfaces that face the same direction, at least."""
+
+STRAYS = 0.05
+"""Share of points that may be touched by no tool without a mistake in the file."""
 
 DEEPER = 0.02 * MM
 """A visit before the last that is predicted to cut deeper by more than this may have left the point."""
@@ -230,16 +234,10 @@ def _touched(
     job: CutProgram, part: MeasuredPart, other: Prepared | None, pairing: Pairing | None
 ) -> tuple[TouchedPoints, Ints, list[Finding]]:
     """States of the points of a part, their numbers (J,), and what is reported."""
-    point, normal = _in_robot(job, part)
+    point, normal, rotation = _in_robot(job, part)
     only = _restricted(job, part)
     contacts = find_contacts(job.motions, point, normal, only)
-    findings = check_contacts(part, contacts.touched)
-    if findings or (~contacts.touched).sum() >= FEW_BESIDE:
-        wide = find_contacts(job.motions, point, normal, only, WIDE)
-        beside = np.where(wide.touched, _signed(wide), np.nan)
-        findings = [*check_nominal(part, beside), *check_shift(part, beside), *findings]
-    else:
-        findings = check_nominal(part, np.where(contacts.touched, _signed(contacts), np.nan))
+    findings = misplaced_findings(PlacedPart(job.motions, part, point, normal, rotation, only, contacts))
     if findings:
         raise Refusal(*findings[:1])
     keep = np.flatnonzero(contacts.touched)
@@ -272,18 +270,41 @@ def _touched(
             words += f", {gone} are not reached by the program that cut the part"
         rows = np.setdiff1d(np.arange(len(part)), keep[good])
         findings.append(Finding("LRN005", words, str(part.file), int(part.line[rows[0]])))
+        findings += _unused_features(part, keep[good], contacts.touched)
     if len(good) < 6:
         message = f"{len(good)} points can be used, where at least 6 are needed"
         raise Refusal(Finding("LRN003", message, str(part.file)))
     return points.part(good), keep[good], findings
 
 
-def _signed(contacts: Contacts) -> Floats:
-    return -contacts.last.distance
+def _unused_features(part: MeasuredPart, used: Ints, touched: Bools) -> list[Finding]:
+    """LRN022: features, or else directions in which surfaces face, of which no point is among the ``used`` (J,); or
+    else more points that are not ``touched`` (K,) than strays are."""
+    feature = np.array(part.feature)
+    lost = [name for name in dict.fromkeys(part.feature) if name and not (feature[used] == name).any()]
+    rows = np.flatnonzero(np.isin(feature, [name for name in lost if (feature == name).sum() >= FEW_BESIDE]))
+    where = f"of {', '.join(dict.fromkeys(feature[rows].tolist()))}"
+    if not len(rows) and len(used):
+        rows = np.flatnonzero((part.normal @ part.normal[used].T).max(axis=1) < FACING)
+        axis = np.argmax(np.abs(part.normal[rows]), axis=1)
+        signs = np.where(part.normal[rows, axis] > 0, "+", "-")
+        faces = sorted({f"{sign}{'XYZ'[k]}" for sign, k in zip(signs.tolist(), axis.tolist(), strict=True)})
+        where = f"on surfaces that face {' or '.join(faces)}"
+    message = f"no point {where} is used ({len(rows)}): what is learnt, and the promise, are of the others"
+    if len(rows) < FEW_BESIDE:
+        rows = np.flatnonzero(~touched)
+        if len(rows) < max(FEW_BESIDE, STRAYS * len(part)):
+            return []
+        message = (
+            f"{len(rows)} of {len(part)} points are on no surface that the tools leave: these, or all of them, may be"
+            " shifted; what is learnt, and the promise, are of the others"
+        )
+    return [Finding("LRN022", message, str(part.file), int(part.line[rows[0]]))]
 
 
-def _in_robot(job: CutProgram, part: MeasuredPart) -> tuple[Floats, Floats]:
-    """Points (K, 3) [m] and normals (K, 3) in the robot base.  Raises Refusal LRN001 where the base is not clear."""
+def _in_robot(job: CutProgram, part: MeasuredPart) -> tuple[Floats, Floats, Floats]:
+    """Points (K, 3) [m] and normals (K, 3) in the robot base, and the rotation (3, 3) of theirs.  Raises Refusal LRN001
+    where the base is not clear."""
     path, task = job.ready.task.toolpath, job.ready.task
     used = np.unique(path.base[job.motions.rows])
     numbers = {path.frames[index].number: index for index in used.tolist()}
@@ -296,9 +317,8 @@ def _in_robot(job: CutProgram, part: MeasuredPart) -> tuple[Floats, Floats]:
     index = used[0] if part.base is None else numbers[part.base]
     row = int(job.motions.rows[np.argmax(path.base[job.motions.rows] == index)])
     base = task.base[np.array([row])]
-    return base.position + turned(base.rotation, part.point), turned(
-        np.repeat(base.rotation, len(part), 0), part.normal
-    )
+    normal = turned(np.repeat(base.rotation, len(part), 0), part.normal)
+    return base.position + turned(base.rotation, part.point), normal, base.rotation[0]
 
 
 def _restricted(job: CutProgram, part: MeasuredPart) -> dict[int, Ints]:

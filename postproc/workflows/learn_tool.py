@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
 from postproc.cell import Cell
-from postproc.cell.tool_errors import SIZES, WALL_SIDES, ToolError
+from postproc.cell.tool_errors import OTHERS, SIZES, WALL_SIDES, ToolError
 from postproc.learning.attribution import Attribution
 from postproc.learning.causes import Cause
 from postproc.learning.measured_part import MeasuredPart
@@ -25,13 +25,26 @@ def _measured(result: Attribution, group: str) -> Iterator[tuple[Cause, float, f
     return (one for one in every if one[0].group == group)
 
 
-def tool_errors(result: Attribution, cell: Cell, sides: Mapping[str, int]) -> dict[int, ToolError]:
-    """The tools of the cell and of the part, with all that was learnt of them; sides: operation -> -1 or 1."""
+@dataclass(frozen=True)
+class MeasuredWalls:
+    """``sides``: operation -> -1 or 1, where its measured walls lie; ``operations``: tool -> those that it cuts."""
+
+    sides: Mapping[str, int]
+    operations: Mapping[int, frozenset[str]]
+
+    def of(self, tool: int) -> dict[str, int]:
+        """``sides`` of the operations that a tool cuts."""
+        own = self.operations.get(tool, frozenset())
+        return {name: side for name, side in self.sides.items() if name in own}
+
+
+def tool_errors(result: Attribution, cell: Cell, walls: MeasuredWalls) -> dict[int, ToolError]:
+    """The tools of the cell and of the part, with all that was learnt of them."""
     errors = dict(cell.tool_errors)
     for cause, value, _ in _measured(result, "tool"):
         number = int(cause.place.split()[-1])
         known = errors.get(number, ToolError())
-        known = replace(known, walls={**known.walls, **sides})
+        known = replace(known, walls={**known.walls, **walls.of(number)})
         size = cause.value + value
         errors[number] = (
             replace(known, radius=size) if cause.parameter == "radius" else replace(known, length=size)
@@ -40,13 +53,13 @@ def tool_errors(result: Attribution, cell: Cell, sides: Mapping[str, int]) -> di
 
 
 def tool_error_lines(
-    result: Attribution, parts: Sequence[MeasuredPart], cell: Cell, sides: Mapping[str, int]
+    result: Attribution, parts: Sequence[MeasuredPart], cell: Cell, measured: MeasuredWalls
 ) -> bytes:
     """``tool_errors:`` for the cell; those of ``cell`` are in it; empty where the part shows nothing of a tool."""
     entries: dict[int, list[str]] = {}
     walls: dict[int, Mapping[str, int]] = {}
     observed = False
-    for number, error in sorted(tool_errors(result, cell, sides).items()):
+    for number, error in sorted(tool_errors(result, cell, measured).items()):
         stated = cell.tool_errors.get(number, ToolError())
         known = {name: (getattr(stated, name), getattr(stated, f"{name}_ci95")) for name in SIZES}
         learnt = {name for name, one in known.items() if one != (0.0, None)}
@@ -71,7 +84,7 @@ def tool_error_lines(
         f"# learnt from {', '.join(part.file.name for part in parts)}, {today}. Measure these tools: either set radius",
         "# and length where control and CAM have them, or add these lines to the cell file; never both. mm by which a",
         "# tool is larger and longer than programmed, with 95 % half widths; walls: side of the feed on which the wall",
-        "# lies, seen along the spindle towards its tip, by operation or `others`.",
+        "# lies, seen along the spindle towards its tip, by operation or `others`; none: it cuts no wall.",
         "tool_errors:",
     ]
     for number, words in entries.items():
@@ -79,6 +92,10 @@ def tool_error_lines(
         lines.append(
             f"  {number}: {{{', '.join(words)}" + (f", walls: {{{sides_of}}}}}" if sides_of else "}")
         )
+        open_ones = sorted(measured.operations.get(number, frozenset()) - set(walls[number]))
+        if open_ones and OTHERS not in walls[number] and any("radius:" in word for word in words):
+            rest = ", ".join(f'"{name}": none' for name in open_ones)
+            lines.append(f"  # no wall was measured of these: if they cut none, add to walls: {rest}")
     return ("\n".join(lines) + "\n").encode()
 
 

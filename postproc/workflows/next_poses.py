@@ -206,10 +206,8 @@ def _like(measured: Measured, planned: Readings) -> Readings:
 
 def _values(final: Fit, unknowns: Sequence[Unknown], candidate: Candidate) -> dict[tuple[int, str], float]:
     """The fitted values of a candidate's parameters, as values of a model in which they are ``unknowns``."""
-    wanted = (candidate.name, candidate.effect.described())
-    fitted = next(
-        (t.values for t in final.model.terms if (t.effect.name, t.effect.described()) == wanted), {}
-    )
+    wanted = (candidate.name, candidate.effect.form())
+    fitted = next((t.values for t in final.model.terms if (t.effect.name, t.effect.form()) == wanted), {})
     return {u.key: fitted[u.parameter.name] for u in unknowns if u.parameter.name in fitted}
 
 

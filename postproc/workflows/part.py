@@ -11,7 +11,7 @@ from postproc.base.findings import Finding
 from postproc.base.units import MM
 from postproc.compensation.subdivision import Subdivision
 from postproc.part import codes as codes
-from postproc.workflows.force_log import logged_force_findings
+from postproc.workflows.force_log import stated_force_findings
 from postproc.workflows.preparation import Prepared
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def part_error_of(
     stock, or where it is not known."""
     task = ready.task
     if task.force.stock is None:
-        return None, logged_force_findings(ready)
+        return None, stated_force_findings(ready)
     from postproc.part.part_error import find_part_error  # numba: only where there is a stock
     from postproc.part.part_uncertainty import StatedIntervals, with_uncertainty
     from postproc.process.stock.simulation import StockRun

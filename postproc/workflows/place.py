@@ -27,7 +27,7 @@ from postproc.workflows.place_exact import exact_figures
 from postproc.workflows.place_feed import feed_turns
 from postproc.workflows.place_problem import PlaceProblem, PlaceRequest, place_problem, stated_direction
 from postproc.workflows.place_spin import SpunPrograms, spin_programs
-from postproc.workflows.place_units import metres_help, radian_ranges, room_elsewhere
+from postproc.workflows.place_units import metre_ranges, metres_help, radian_ranges, room_elsewhere
 from postproc.workflows.preparation import Stage, silent
 
 POOL = 1500
@@ -234,7 +234,7 @@ def _findings(
             f" singularity {present.singular_deg:.1f} deg"
         )
         found.append(Finding("PLC006", message, str(request.programs[0]), present.limit_line))
-    found += radian_ranges(problem.room, cell)
+    found += metre_ranges(request.ranges, cell) + radian_ranges(problem.room, cell)
     edges = problem.room.at_edge(best.place)
     if edges:
         found.append(Finding("PLC007", f"the best place is at the edge of: {', '.join(edges)}", cell))

@@ -23,7 +23,7 @@ from postproc.report.report import exit_code, in_order_of_place, json_bytes
 from postproc.workflows.place_collisions import checked_shapes, shape_findings
 from postproc.workflows.place_exact import exact_figures
 from postproc.workflows.place_problem import PlaceProblem, PlaceRequest, place_problem
-from postproc.workflows.place_units import metre_places, radian_places
+from postproc.workflows.place_units import metre_findings, metre_places, radian_places
 from postproc.workflows.preparation import Stage, silent
 
 DECIMALS = 3
@@ -49,6 +49,7 @@ def assign(request: AssignRequest, stage: Stage = silent) -> PartAssignment:
 
 def _assign(request: AssignRequest, inputs: Inputs, stage: Stage) -> PartAssignment:
     common = request.common
+    _refuse_one_spot(request)
     problems = []
     for program in common.programs:
         stage(f"reading {program.name}")
@@ -69,7 +70,8 @@ def _assign(request: AssignRequest, inputs: Inputs, stage: Stage) -> PartAssignm
     names = list(request.places)
     shapes = [problem.shapes for problem in problems]
     findings = [one for problem in problems[:1] for one in shape_findings(problem.shapes, problem.prepared)]
-    findings += radian_places(request.places, str(problems[0].moved.cell.path))
+    file = str(problems[0].moved.cell.path)
+    findings += metre_findings(request.places, file) + radian_places(request.places, file)
     for k in np.flatnonzero(chosen < 0).tolist():
         findings.append(
             _without(pairs[k * count : (k + 1) * count], common.objective, str(common.programs[k]))
@@ -85,6 +87,19 @@ def _assign(request: AssignRequest, inputs: Inputs, stage: Stage) -> PartAssignm
         findings=tuple(in_order_of_place(findings)),
     )
     return _written(request, done, problems, chosen, inputs)
+
+
+def _refuse_one_spot(request: AssignRequest) -> None:
+    """Raises Refusal PLC023 where two places for several parts have the same origin."""
+    spots: dict[tuple[float, ...], str] = {}
+    if len(request.common.programs) < 2:
+        return
+    for name, (*spot, _) in request.places.items():
+        other = spots.setdefault(tuple(round(length, DECIMALS) for length in spot), name)
+        if other != name:
+            message = f"the places {other} and {name} are at one spot, where one part alone can lie"
+            help = "state each place once; of one spot with several turns, the one to use"
+            raise Refusal(Finding("PLC023", message, str(request.common.programs[0]), help=help))
 
 
 def assign_places(values: Floats) -> Ints:

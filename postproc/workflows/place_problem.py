@@ -206,15 +206,15 @@ def _room(
         ends = np.array([low, high]) * UNITS[at]
         if polygon is not None and at < 2:
             ends = np.array([max(ends[0], lower[at]), min(ends[1], upper[at])])
-            if ends[0] >= ends[1]:
+            if ends[0] > ends[1] or (ends[0] == ends[1] and low < high):
                 message = f"the polygon of the room and the range of {name} have no place in common"
                 raise Refusal(Finding("PLC002", message, str(cell.path)))
         lower[at], upper[at] = ends
     if track is not None and (lower[TRACK] < track[1] or upper[TRACK] > track[2]):
         message = f"the range of the track exceeds its limits {track[1] / MM:g} .. {track[2] / MM:g} mm"
         raise Refusal(Finding("PLC003", message, str(cell.path), help="state a range within the limits"))
-    if request.searched and not request.spin and not (upper > lower).any():
-        message = "no freedom has a range: nothing may move"
+    if request.searched and not (upper > lower).any() and not (request.spin and (lower == present).all()):
+        message = "no freedom has a range: there is no place to search for"
         help = (
             "use --x a:b, --y a:b, --z a:b, --turn a:b, --tool-turn a:b or --spin, or state room: in the cell"
         )

@@ -20,7 +20,17 @@ def metres_help(ranges: Mapping[str, tuple[float, float]]) -> str:
     if not lengths or any(max(-low, high) >= METRES for low, high in lengths.values()):
         return ""
     name, (low, high) = next(iter(lengths.items()))
-    return f"ranges are in mm: for metres write --{name} {1000 * low:g}:{1000 * high:g}"
+    ends = f"{1000 * low:g}:{1000 * high:g}" if low < high else f"{1000 * low:g}"
+    return f"ranges are in mm: for metres write --{name} {ends}"
+
+
+def metre_ranges(ranges: Mapping[str, tuple[float, float]], file: str) -> list[Finding]:
+    """PLC022 where all lengths of ``ranges`` [mm] are those of metres."""
+    help = metres_help(ranges)
+    if not help:
+        return []
+    message = f"all ranges of lengths are within {METRES:g} mm of the robot's base, as if they were in metres"
+    return [Finding("PLC022", message, file, help=help)]
 
 
 def metre_places(places: Mapping[str, Sequence[float]]) -> dict[str, str]:
@@ -33,12 +43,21 @@ def metre_places(places: Mapping[str, Sequence[float]]) -> dict[str, str]:
     return found
 
 
+def metre_findings(places: Mapping[str, Sequence[float]], file: str) -> list[Finding]:
+    """PLC022 for those of ``places`` (x, y, z [mm] ...) whose lengths are those of metres."""
+    return [
+        Finding("PLC022", f"place {name} is within {METRES:g} mm of the robot's base, as if it were in metres", file,
+                help=help)
+        for name, help in metre_places(places).items()
+    ]  # fmt: skip
+
+
 def radian_ranges(room: Room, file: str) -> list[Finding]:
     """PLC021 for ranges of turns whose ends are round parts of pi: deg that were written as radians."""
     found = []
     for i in (TURN, TOOL_TURN):
         low, high = (float(end[i] / UNITS[i]) for end in (room.lower, room.upper))
-        if i in room.free and are_radians((low, high)):
+        if i in room.stated and are_radians((low, high)):
             name = FREEDOMS[i].replace("_", "-")
             message = f"the range of {name}, {low:g} .. {high:g} deg, is round only in radians"
             help = f"turns are in deg: from radians --{name} {low / DEG:.4g}:{high / DEG:.4g}"

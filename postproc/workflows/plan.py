@@ -4,28 +4,24 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 
 from postproc import __version__
 from postproc.base.arrays import Bools, Floats
 from postproc.base.findings import Finding, Refusal, nearest
-from postproc.base.geometry import Poses
 from postproc.base.input_files import place
 from postproc.base.tables import finite_number
 from postproc.base.units import DEG, MM, to_si, words_for
 from postproc.compensation.input_sensitivities import goal_sensitivities, sensitivities
 from postproc.compensation.problem import rotate_wrench
 from postproc.compensation.uncertain_inputs import UncertainInput
-from postproc.effects import ComplianceLaw
 from postproc.experiments.candidate_setups import (
     CandidateSetups,
     Setups,
     readings_of,
     spacings,
-    usable_limits,
 )
 from postproc.experiments.discrimination import apart
 from postproc.experiments.measuring_order import measuring_order
@@ -41,6 +37,7 @@ from postproc.report.planned import Planned, discrimination_words
 from postproc.report.report import exit_code, json_bytes
 from postproc.robot.description import Robot, find_robot, load_robot
 from postproc.workflows.identify import measured_of
+from postproc.workflows.plan_setups import PlanRequest, candidate_setups, implausible_lengths
 from postproc.workflows.preparation import Request, Stage, prepare, silent
 
 SIZES = (10, 15, 20, 30)
@@ -55,52 +52,12 @@ SHARE, SIZE_SHARE = 0.05, 0.2
 CUTS = 300
 """Motions of a program at which the error counts."""
 
-HEAVIEST = 3000.0
-"""[kg] No robot carries more."""
-
 CLEAR = 3.0
 """Standard deviations that distinguish two effects."""
 
 LISTED = 3
 
 _WANTED = re.compile(r"(?:([\w.#]+)\s*=)?\s*([-+0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(%|[A-Za-z].*)?")
-
-
-@dataclass(frozen=True)
-class PlanRequest:
-    """What the user asked for; mm, deg, kg.
-
-    targets: name and place; limits: joint and range; box: three ranges, infinite where open; kind: deflection or
-    absolute, None: as the effects ask for; criterion: minimax, d or test, None: test where there is a program; wanted:
-    texts.  program: with its ``force`` (as of the main job) and ``cell``, what the test poses are taken from.
-    """
-
-    robot: str
-    effects: tuple[str, ...]
-    poses: int
-    output: Path
-    loads: tuple[float, ...] = ()
-    one_load: bool = False
-    tool_mm_deg: tuple[float, ...] = (0.0,) * 6
-    targets: tuple[tuple[str, tuple[float, ...]], ...] = ()
-    rough_targets: bool = False
-    kind: str | None = None
-    sigma_mm: float = 0.03
-    criterion: str | None = None
-    wanted: tuple[str, ...] = ()
-    program: Path | None = None
-    force: str = ""
-    cell: Path | None = None
-    tracker_mm: tuple[float, ...] | None = None
-    cone_deg: float = 60.0
-    box_mm: tuple[tuple[float, float], ...] = ((-np.inf, np.inf), (-np.inf, np.inf), (0.0, np.inf))
-    limits: tuple[tuple[str, tuple[float, float]], ...] = ()
-    spacing_deg: float = 5.0
-    measured: tuple[Path, ...] = ()
-    discriminate: tuple[str, str] | None = None
-    seed: int = 1
-    json: Path | None = None
-    page: Path | None = None
 
 
 def plan(request: PlanRequest, stage: Stage = silent) -> Planned:
@@ -110,7 +67,8 @@ def plan(request: PlanRequest, stage: Stage = silent) -> Planned:
     robot = load_robot(find_robot(request.robot))
     model = StiffnessModel.from_robot(robot)
     asked = asked_for(model, request.effects)
-    candidates = _candidate_setups(request, robot, asked.model, asked.unknowns)
+    candidates = candidate_setups(request, robot, asked.model, asked.unknowns)
+    implausible = implausible_lengths(request, robot)
     if request.discriminate is not None:
         planned = _discriminating_poses(request, candidates, asked.model, asked.unknowns, stage)
     else:
@@ -120,13 +78,15 @@ def plan(request: PlanRequest, stage: Stage = silent) -> Planned:
     readings = _in_sight(candidates, planned.model, setups)
     files = {request.output: measurements_csv(readings, _about(request, planned, len(readings)))}
     reports = [path for path in (request.json, request.page) if path is not None]
+    findings = (*implausible, *planned.findings)
     planned = replace(
         planned,
         setups=setups,
         readings=len(readings),
         fixed=asked.fixed,
         outputs=tuple(str(path) for path in (*files, *reports)),
-        exit=exit_code(planned.findings),
+        findings=findings,
+        exit=exit_code(findings),
     )
     if request.json is not None:
         files[request.json] = json_bytes(planned)
@@ -258,61 +218,6 @@ def _spare_inputs(request: PlanRequest) -> None:
     for path in written:
         if place(path) in inputs:
             raise Refusal(Finding("FIL007", "the output would replace an input", str(path)))
-
-
-def _candidate_setups(
-    request: PlanRequest, robot: Robot, model: StiffnessModel, unknowns: Sequence[Unknown]
-) -> CandidateSetups:
-    """What the user can set up, in SI.  Raises Refusal PLN001, PLN005, PLN006."""
-    names = [joint.name for joint in robot.joints]
-    limits = {}
-    for name, ends in request.limits:
-        joint = next((joint for joint in robot.joints if joint.name.casefold() == name.casefold()), None)
-        if joint is None:
-            message = f"--limits: {name!r} is not a joint of {robot.name}{nearest(name, names)}"
-            raise Refusal(
-                Finding("PLN006", message, str(robot.path), help="the joints are " + ", ".join(names))
-            )
-        unit = DEG if joint.kind == "revolute" else MM
-        limits[joint.name] = ends[0] * unit, ends[1] * unit
-    tool = Poses.from_abc(np.array(request.tool_mm_deg[:3]) * MM, np.array(request.tool_mm_deg[3:]) * DEG)
-    places = (
-        np.array([place for _, place in request.targets]) * MM if request.targets else tool.position[None]
-    )
-    deflection = request.kind == "deflection" if request.kind else _by_load(model, unknowns)
-    loads = sorted(set(request.loads) - ({0.0} if deflection else set()))
-    if loads and loads[-1] > HEAVIEST:
-        message = f"no robot carries a load of {loads[-1]:g} kg; is it in grams?"
-        raise Refusal(Finding("PLN006", message, str(robot.path), help="loads are in kg"))
-    if deflection and not loads:
-        raise Refusal(
-            Finding(
-                "PLN005",
-                "deflections are the loaded minus the unloaded place, and no load is given",
-                help="use --loads 100,200 (weights in kg at the TCP), or measure places: --kind absolute",
-            )
-        )
-    return CandidateSetups(
-        tool=tool,
-        targets=tuple(name for name, _ in request.targets),
-        places=places,
-        rough=request.rough_targets,
-        loads=np.array(loads or [0.0]),
-        each_load=not request.one_load,
-        deflection=deflection,
-        sigma=request.sigma_mm * MM,
-        limits=usable_limits(robot, limits),
-        box=np.array(request.box_mm) * MM,
-        tracker=None if request.tracker_mm is None else np.array(request.tracker_mm) * MM,
-        cone=request.cone_deg * DEG,
-        spacing=request.spacing_deg * DEG,
-    )
-
-
-def _by_load(model: StiffnessModel, unknowns: Sequence[Unknown]) -> bool:
-    """Whether a load is what shows any of the effects asked for."""
-    effects = [model.terms[unknown.term].effect for unknown in unknowns]
-    return any(isinstance(e, ComplianceLaw) or e.family in ("elastic", "sensor") for e in effects)
 
 
 def _wanted(request: PlanRequest, unknowns: Sequence[Unknown]) -> tuple[Floats, Bools, str]:

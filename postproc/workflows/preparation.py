@@ -43,6 +43,7 @@ from postproc.workflows.cell_force_factors import factored
 from postproc.workflows.cell_tool_errors import cell_tool_displacement
 from postproc.workflows.correction_mode import corrected_model, mode_findings, temperature_rise, touch_off
 from postproc.workflows.data_list import read_controller_data
+from postproc.workflows.machine_vectors import refuse_machine_orientations
 from postproc.workflows.ramp_lengths import early_shares, ramp_lengths
 from postproc.workflows.reading_findings import configuration_findings, reader_findings, start_findings
 
@@ -266,8 +267,8 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
     task = add_force_ramps(task, ramp_lengths(cell, path, force), early_shares(cell, task))
     spacing = np.maximum(cell.min_segment, 1e-3 * cell.cycle_ms * np.nan_to_num(path.feed))
     task = add_lost_motion(task, start, spacing)
-    tool_findings: tuple[Finding, ...] = ()
-    if learned is None and cell.tool_errors:
+    tool_findings: list[Finding] = []
+    if learned is None:
         known, tool_findings = cell_tool_displacement(cell, task, frames)
         task = replace(task, known_error=known)
     findings = [
@@ -279,7 +280,7 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
         *force.findings,
         *model.plausibility_findings(),
     ]
-    findings += mode_findings(full, cell, str(request.program))
+    findings += mode_findings(full, cell, path, str(request.program))
     if cell.correct == "touched_off":
         touched, touch_findings = touch_off(task, cell)
         task = replace(task, touched_off=touched)
@@ -427,9 +428,9 @@ def _start(cell: Cell, robot: Robot) -> Floats | None:
 
 
 def completed(path: Toolpath, cell: Cell, robot: Robot, program: Path) -> Toolpath:
-    """The toolpath with its external axes where they are, with the numbers of literal tools, and with targets that
-    continue an axis motion filled in from where that one leads."""
-    start, path = _start(cell, robot), number_literal_tools(cell, path)
+    """The toolpath as the cell completes it: external axes, numbers of literal tools, what axis motions lead to."""
+    start = _start(cell, robot)
+    path = refuse_machine_orientations(number_literal_tools(cell, path), cell, program)
     path = fill_external_axes(path, cell.external_axes, robot, start, program, cell.path)
     rows = np.flatnonzero(path.partial_targets.inherits_from_row >= 0)
     if not len(rows):

@@ -56,6 +56,7 @@ from postproc.workflows.preparation import (
     silent,
 )
 from postproc.workflows.ramp_lengths import nearest_point
+from postproc.workflows.replaced_reports import replaced_reports
 
 if TYPE_CHECKING:
     from postproc.part.part_figures import PartFigures
@@ -76,7 +77,12 @@ def _predict(request: Request, stage: Stage) -> Report:
     stage("predicting")
     result = _correct(ready, replace(ready.task, gain=0.0))
     part, of_part = part_error_of(ready, None)
-    findings = in_order_of_place([*ready.findings, *result.findings, *of_part])
+    of_reports = []
+    if request.report:
+        of_reports = replaced_reports(
+            request.report / f"{request.program.stem}.prediction.json", request.program
+        )
+    findings = in_order_of_place([*ready.findings, *result.findings, *of_part, *of_reports])
     report = report_of(request, ready, result, findings, part=None if part is None else part.figures)
     if request.keep_table:
         report = replace(report, motion_table=correction_table(ready.task, result))
@@ -172,7 +178,10 @@ def _compensate(request: Request, stage: Stage) -> Report:
     names = [folder / f"{stem}.{end}" for end in ("report.json", "corrections.csv", "diff", "report.html")]
     names += [] if request.json is None else [request.json]
     if request.stream is not None:
+        if request.report is not None:
+            findings += replaced_reports(names[0], request.program)
         return _streamed(request, ready, written, in_order_of_place(findings), shown)
+    findings += replaced_reports(names[0], request.program, target)
     stage("reporting")
     release_free_memory()
     report = report_of(request, ready, result, in_order_of_place(findings), written, shown)
@@ -186,7 +195,7 @@ def _compensate(request: Request, stage: Stage) -> Report:
     _not_over_inputs(ready, report.outputs)
     _refuse_suffix(target, ready)
     if request.dry_run:
-        return replace(report, outputs=())
+        return _result_alone(request, ready, report)
     diff = chain.from_iterable(
         unified_diff(document, path.name, edits.of(index), outputs[path])
         for index, (document, path) in enumerate(zip(program.documents, paths, strict=True))
@@ -219,6 +228,14 @@ def _compensate(request: Request, stage: Stage) -> Report:
     return report
 
 
+def _result_alone(request: Request, ready: Prepared, report: Report) -> Report:
+    """The report of a dry run, which writes the result that is asked for by name, and nothing else."""
+    report = replace(report, outputs=() if request.json is None else (str(request.json),))
+    if request.json is not None:
+        write_atomically({request.json: json_bytes(report)}, still=ready.inputs.refuse_changed)
+    return report
+
+
 def _streamed(
     request: Request,
     ready: Prepared,
@@ -246,7 +263,7 @@ def _streamed(
     report = replace(report, outputs=tuple(map(str, [*files, *pages])))
     _not_over_inputs(ready, report.outputs)
     if request.dry_run:
-        return replace(report, outputs=())
+        return _result_alone(request, ready, report)
     ready.inputs.refuse_changed()
     if files or pages:
         files |= dict.fromkeys(pages, json_bytes(report))

@@ -211,6 +211,20 @@ CODES = define(
             action="Add what the message names.",
             example="`temperature: 24` for a robot file without thermal_growth.",
         ),
+        "COR033": Code(
+            "warning",
+            "weight of a tool has no effect",
+            meaning=(
+                "A weight of a tool is stated, the correction contains weights, and something that this one needs is"
+                " missing: the tool or its mass in the cell, or the effect payload in the robot file. Or the program"
+                " states another load than the cell, by its data or while it runs ($LOAD, GripLoad, PAYLOAD)."
+            ),
+            consequence=(
+                "The sag of the robot under this tool or load remains as an error, and no figure contains it."
+            ),
+            action="Add what the message names.",
+            example="`correct: absolute` and a tool with `mass: 100`, for a robot file without payload.",
+        ),
         "COR032": Code(
             "info",
             "base is touched off",
@@ -263,12 +277,12 @@ CODES = define(
             "warning",
             "differs from the original",
             meaning=(
-                "Something other than corrected places differs: a frame, feed, external axis or air "
-                "move, or a motion is missing."
+                "Something other than corrected places differs: a statement or the motion that it follows, a word"
+                " of a motion, a frame, feed, external axis or air move, or a motion is missing."
             ),
             consequence="The output makes something else than the original.",
             action="Compare the lines that the message names.",
-            example="A LIN with another $VEL.CP.",
+            example="A LIN with another $VEL.CP, or a HALT that the original does not have.",
         ),
         "VER006": Code(
             "warning",
@@ -300,6 +314,17 @@ CODES = define(
             action="Nothing; a longer force_ramp, if the force changes more slowly, makes the places distinct.",
             example="A corner at which the force turns, and the tool is deflected by more than its ramp.",
         ),
+        "VER009": Code(
+            "warning",
+            "compensated from other inputs",
+            meaning=(
+                "The mark of the compensated program states the SHA-256 of the file that it was made from and of the"
+                " robot, and one of them is not that of this run."
+            ),
+            consequence="The original or the robot file was changed since, or the program belongs to another one.",
+            action="Compensate the original again, or name the file and the robot that the program was made with.",
+            example="An M code that was added to the original after it was compensated.",
+        ),
         "FIL012": Code(
             "error",
             "program of two files in a stream",
@@ -307,6 +332,14 @@ CODES = define(
             consequence="The program alone would be corrected in part.",
             action="Name a folder with -o instead of -.",
             example="`compensate - -o - --stdin-name taught.src --force` of a program with points in taught.dat.",
+        ),
+        "FIL016": Code(
+            "info",
+            "reports of another program",
+            meaning="The reports have the names of those that another program already has in this folder.",
+            consequence="They are replaced; the other program is not.",
+            action="To keep both, name another folder with -o or --report, or rename one of the programs.",
+            example="panel.src after panel.ngc, both to compensated/.",
         ),
         "FIL014": Code(
             "error",

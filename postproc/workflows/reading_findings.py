@@ -16,6 +16,7 @@ from postproc.robot.axis_track import AxisTrack, branch_matches
 from postproc.robot.description import Robot
 from postproc.robot.makers import maker_of
 from postproc.toolpath import Kind, Toolpath
+from postproc.workflows.machine_vectors import MESSAGE
 
 FASTEST = 100.0
 """[m/s] Feeds above it are written in another unit, or mistyped: points that the controller runs without slowing are
@@ -24,16 +25,20 @@ farther apart than any cut is long."""
 
 def reader_findings(program: Program, path: Toolpath) -> list[Finding]:
     """The findings of the reader, but for the external axes: what they carry, the cell has stated by now; and the
-    motions at which one of them is not known.
+    motions at which one of them is not known, or the orientation is in axes of the machine.
 
     Raises Refusal FIL015 where a motion states a feed that no machine has.
     """
     _refuse_impossible_feeds(path, program.documents[0].path)
     findings = [finding for finding in program.findings if finding.topic is not Topic.EXTERNAL_AXES]
-    lost = [finding for finding in path.constraints.refused.values() if finding.code == "EXT004"]
-    if lost:
-        more = f" ({len(lost)} motions)" if len(lost) > 1 else ""
-        findings.append(replace(lost[0], message=lost[0].message + more))
+    refused = path.constraints.refused.values()
+    for lost in (
+        [finding for finding in refused if finding.code == "EXT004"],
+        [finding for finding in refused if finding.message == MESSAGE],
+    ):
+        if lost:
+            more = f" ({len(lost)} motions)" if len(lost) > 1 else ""
+            findings.append(replace(lost[0], message=lost[0].message + more))
     return findings
 
 

@@ -49,18 +49,18 @@ def new_robot_file(
     by_key = {estimate.unknown.key: estimate for estimate in estimates}
     written = []
     for index, term in enumerate(fitted.model.terms):
-        parameters = []
+        parameters, own = [], source + _counted_from(term, campaign.readings)
         for parameter in term.effect.parameters:
             name, unit, stated = parameter.name, parameter.unit, term.stated.get(parameter.name)
             estimate = by_key.get((index, name))
             if estimate is not None:
-                parameters.append(WrittenParameter(name, estimate.value, unit, estimate.ci95, source=source))
+                parameters.append(WrittenParameter(name, estimate.value, unit, estimate.ci95, source=own))
             elif stated is not None:
                 parameters.append(WrittenParameter.of(name, unit, stated))
             elif term.values[name] != parameter.null:
                 # the others hold for this value
                 fixed_source = (
-                    f"{source}; the readings do not show it, and the values beside it belong to this value"
+                    f"{own}; the readings do not show it, and the values beside it belong to this value"
                 )
                 parameters.append(WrittenParameter(name, term.values[name], unit, source=fixed_source))
         if parameters or term.line:
@@ -86,12 +86,21 @@ def new_robot_file(
     return robot_file(robot, written, run, destination)
 
 
+def _counted_from(term: EffectInstance, readings: Readings) -> str:
+    """From which temperature a growth was counted, where the entry that it continues does not state it."""
+    effect = term.effect
+    if not isinstance(effect, ThermalGrowth) or effect.reference is not None or not term.line:
+        return ""
+    options = effect_options(term, readings)
+    return f"; growth counted from {options['reference']:g} degC" if "reference" in options else ""
+
+
 def effect_options(term: EffectInstance, readings: Readings) -> dict[str, object]:
-    """The options of an effect; a growth by temperature counts from that of the first reading."""
+    """The options of an effect; a growth by temperature with that from which the readings count it."""
     options = dict(term.effect.described())
     by_temperature = isinstance(term.effect, ThermalGrowth) and options["variable"] == "temperature"
-    if by_temperature and readings.temperature is not None:
-        options["reference"] = round(float(readings.temperature[0]), 3)
+    if by_temperature and readings.calibrated_at is not None:
+        options["reference"] = round(readings.calibrated_at, 3)
     return options
 
 

@@ -17,6 +17,7 @@ from postproc.report.report import Spread, exit_code, in_order_of_place, json_by
 from postproc.report.verified import PathComparison, Verified, WorstError
 from postproc.verification.approximation_words import other_words
 from postproc.verification.differences import Difference, PathManner, in_air, missing, on_cuts
+from postproc.verification.motion_ends import MotionEnds
 from postproc.verification.pairing import Different, pair_motions
 from postproc.verification.simulator import STEP, Simulation, Simulator
 from postproc.workflows.preparation import (
@@ -27,6 +28,7 @@ from postproc.workflows.preparation import (
     refuse_without_force,
     silent,
 )
+from postproc.workflows.stated_differences import mark_findings, statement_findings
 
 WORST = 10
 """Places that are listed."""
@@ -69,7 +71,13 @@ def _verify(request: Request, compensated: Path, step: float, stage: Stage, page
     manners = [PathManner.of(simulator, ready.task, before), PathManner.of(simulator, other.task, after)]
     findings = [
         *ready.findings,
-        *_marks(other, compensated),
+        *_marks(ready, other, compensated),
+        *statement_findings(
+            ready.dialect.family,
+            (ready.program, other.program),
+            (ready.task.toolpath, other.task.toolpath),
+            MotionEnds.of(simulator, other.task, after) if after.converged else None,
+        ),
         *_figures(ready, ready, before, request.program, judged=False),
         *_figures(ready, other, after, compensated, judged=True),
         *_differences(simulator, ready, other, after, manners, request.program, compensated),
@@ -173,9 +181,9 @@ def _worst(simulator: Simulator, ready: Prepared, simulation: Simulation) -> tup
     return tuple(worst.values())
 
 
-def _marks(other: Prepared, compensated: Path) -> list[Finding]:
+def _marks(ready: Prepared, other: Prepared, compensated: Path) -> list[Finding]:
     if other.program.marker is not None:
-        return []
+        return mark_findings(other.program, ready.program, ready.robot)
     return [Finding("VER002", "this program has no mark of a compensation", str(compensated))]
 
 

@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from .judge import Case, Verdict, judge, judge_split, shrunk
 from .programs import Generator
+from .written import judge_written
 
 
 def main() -> int:
@@ -22,7 +23,14 @@ def main() -> int:
     parser.add_argument(
         "--split", action="store_true", help="all routines but the first in modules of their own"
     )
+    parser.add_argument(
+        "--written",
+        action="store_true",
+        help="motions are moved, and what is written is run beside the program",
+    )
     given = parser.parse_args()
+    if given.written:
+        return run_written(range(given.seed, given.seed + given.count))
     judged = judge_split if given.split else judge
     total: Counter[str] = Counter()
     start, wrong = time.perf_counter(), 0
@@ -46,6 +54,19 @@ def main() -> int:
         f"claimed known {share(total['constant_known'], total['constant'])}"
     )
     print(f"{wrong} programs with disagreements; {time.perf_counter() - start:.0f} s")
+    return min(wrong, 1)
+
+
+def run_written(seeds: range) -> int:
+    """Runs what is written for programs whose motions are moved."""
+    moves = wrong = 0
+    for seed in seeds:
+        count, found = judge_written(Generator(seed).case(), seed)
+        moves += count
+        wrong += bool(found)
+        for one in found[:1]:
+            print(f"seed {seed}: {one}", flush=True)
+    print(f"{len(seeds)} programs, {moves} moved motions executed, {wrong} programs with others than planned")
     return min(wrong, 1)
 
 

@@ -18,7 +18,7 @@ from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import each_block
 from postproc.base.decimals import plain_decimals
 from postproc.base.tables.csv_lines import NOTHING, CsvLines
-from postproc.base.tables.csv_spelling import as_text
+from postproc.base.tables.csv_spelling import as_text, is_number
 
 BLOCK = 1 << 20
 """Bytes at a time; more than a line may have."""
@@ -63,6 +63,15 @@ class CsvCells:
         """Whether any cell can hold one."""
         return b"'" in self.raw
 
+    @cached_property
+    def decimal_comma(self) -> tuple[int, str] | None:
+        """Row and text of a number with a decimal comma, None where no column has one; where commas do not separate."""
+        for index in range(self.ends.shape[1]):
+            for row, text in CsvColumn(self, index).with_letter(","):
+                if is_number(text.replace(",", ".", 1)):
+                    return row, text
+        return None
+
     def bounds(self, column: int, rows: slice) -> tuple[Ints, Ints]:
         """Where the cells of a column start and end, two (K,) offsets of ``rows``, without quotes and blanks; an empty
         one for ``others``."""
@@ -71,6 +80,13 @@ class CsvCells:
         start, stop = _trimmed(data, cell_start.astype(np.int64), self.ends[rows, column].astype(np.int64))
         quoted = (start < stop) & (data[np.minimum(start, len(data) - 1)] == _QUOTED)
         return _trimmed(data, start + quoted, stop - quoted) if quoted.any() else (start, stop)
+
+
+def _contain(data: NDArray[np.uint8], start: Ints, stop: Ints, letter: str) -> Bools:
+    """Which cells (K,) contain a letter."""
+    low, high = int(start.min(initial=len(data))), int(stop.max(initial=0))
+    places = low + np.flatnonzero(data[low:high] == ord(letter))
+    return np.asarray(np.searchsorted(places, stop) > np.searchsorted(places, start))
 
 
 def _trimmed(data: NDArray[np.uint8], start: Ints, stop: Ints) -> tuple[Ints, Ints]:
@@ -131,6 +147,20 @@ class CsvColumn(Sequence[str]):
 
         each_block(read, len(self), ROWS)
         return values
+
+    def with_letter(self, letter: str, without: str = "") -> Iterator[tuple[int, str]]:
+        """(row, text) of the cells that contain ``letter``, and not ``without``."""
+        data = np.frombuffer(self.cells.raw, np.uint8)
+        for rows in _blocks(len(self)):
+            start, stop = self.cells.bounds(self.column, rows)
+            found = _contain(data, start, stop, letter)
+            if without and found.any():
+                found &= ~_contain(data, start, stop, without)
+            if not found.any() and not self.cells.others:
+                continue
+            for row, text in enumerate(self._texts(rows), start=rows.start):
+                if letter in text and not (without and without in text):
+                    yield row, text
 
     def _plain(self, rows: slice, comma: bool) -> tuple[Floats, Bools]:
         """Values of some rows, and which of them are numbers in the letters that numbers have."""

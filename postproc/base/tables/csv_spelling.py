@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?\Z")
 _FORMULA = re.compile(r"'*[=+\-@]")
@@ -23,6 +24,11 @@ def is_number(text: str) -> bool:
 def finite_number(text: str) -> float | None:
     """The number that ``text`` is, with a decimal point; None if it is none, or too large."""
     return float(text) if is_number(text) and math.isfinite(float(text)) else None
+
+
+def mixes_decimals(words: Sequence[str]) -> bool:
+    """Whether some of the words have a decimal comma and others a point: 1.000 beside 0,5 may be one or a thousand."""
+    return any("," in word for word in words) and any("." in word for word in words)
 
 
 def as_cell(text: str) -> str:

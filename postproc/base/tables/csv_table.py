@@ -1,9 +1,10 @@
 """CSV files as columns: every mistake is reported with file, line and column name.
 
 A header row, then rows with as many cells.  Comma, semicolon or tab, whichever gives the header most cells;
-where it is not the comma, a decimal comma is understood.  Blank lines and lines that start with ``#`` are skipped,
-above the header also those that a spreadsheet has put in quotes, and the ``sep=;`` of Excel.  An apostrophe before
-= + - @, by which a spreadsheet is informed that a cell is no formula, is not part of the cell.
+where it is not the comma, a decimal comma is understood, in all numbers of a file or in none.  Blank lines and lines
+that start with ``#`` are skipped, above the header also those that a spreadsheet has put in quotes, and the ``sep=;``
+of Excel.  An apostrophe before = + - @, by which a spreadsheet is informed that a cell is no formula, is not part of
+the cell.
 """
 
 from __future__ import annotations
@@ -73,6 +74,7 @@ class CsvTable:
 
     def _numbers(self, name: str, may_miss: bool) -> Floats:
         comma = self.separator != ","
+        self._check_decimals(name)
 
         def one(row: int, cell: str) -> float:
             if may_miss and is_missing(cell):
@@ -89,6 +91,22 @@ class CsvTable:
         values = self.columns[name].numbers(one, comma)
         values.setflags(write=False)
         return values
+
+    def _check_decimals(self, name: str) -> None:
+        """Refuses a number with a point in a file with decimal commas: 1.000 may be one or a thousand."""
+        column = self.columns[name]
+        if self.separator == "," or column.cells.decimal_comma is None:
+            return
+        for row, text in column.with_letter(".", without=","):
+            if not is_number(text):
+                continue
+            at, comma = column.cells.decimal_comma
+            message = (
+                f"{text[:40]!r} has a point, and the decimals of this file are after a comma, as {comma[:40]!r} in"
+                f" line {self.lines[at]}"
+            )
+            help = "write all decimals with one sign, and thousands without a separator: 1000, not 1.000"
+            raise self.error(row, name, message, help)
 
     def error(self, row: int, name: str, message: str, help: str = "") -> Refusal:
         """A Refusal that points at the cell of column ``name`` in ``row`` (from 0)."""

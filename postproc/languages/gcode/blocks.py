@@ -76,7 +76,8 @@ class What:
     MODE = "absolute or incremental is not known"
     TIP = "the change of the TCP mode"
     LENGTH = "the change of the tool's length"
-    ORIGIN = "G92 where the position is not known"
+    INCREMENT = "an increment after a change of coordinates, of which a setting states where it starts"
+    ORIGIN = "a new origin where the position is not known"
 
 
 class Reasons:
@@ -291,8 +292,9 @@ def _targets(words: BlockWords) -> tuple[Bools, Floats, Bools]:
     return (words.motion & ~words.machine)[:, None] & words.present, np.stack(values, axis=1), words.relative
 
 
-def tilted(words: BlockWords) -> Bools:
-    """(B,) of a whole program: blocks after which rotary axes may be away from 0.
+def tilted(words: BlockWords, tilting: Bools) -> Bools:
+    """(B,) of a whole program: blocks after which rotary axes may be away from 0; tilting (B,): those that state
+    a direction of the tool which turns them.
 
     Without a change of the TCP mode that states nothing, and no block is named."""
     tip = words.modal.force[Group.TCP]
@@ -301,7 +303,7 @@ def tilted(words: BlockWords) -> Bools:
     target, value, relative = _targets(words)
     home = words.motion & words.modal.has(Once.HOME)
     return np.logical_or.accumulate(
-        (target[:, 3:] & ((value[:, 3:] != 0) | relative[:, 3:])).any(axis=1) | home
+        tilting | (target[:, 3:] & ((value[:, 3:] != 0) | relative[:, 3:])).any(axis=1) | home
     )
 
 
@@ -425,5 +427,5 @@ def frame_events(
         leave(linear, lengths & away, What.LENGTH)
     by_machine = words.motion & modal.has(Once.HOME, Once.MACHINE)
     return AxisWords(
-        np.where(target, value, 0.0), target & ~relative, relative, lost, left, by_machine, lengths
+        np.where(target, value, 0.0), target & ~relative, target & relative, lost, left, by_machine, lengths
     )

@@ -146,6 +146,8 @@ LINUXCNC = Control(
     drills=_DRILLS,
     states_tool=61,
     keeps_length=True,
+    saves_modes=True,
+    longest_line=253,  # LINELEN 255 of its interp_internal.hh; _read refuses what fills its buffer
 )
 """LinuxCNC, and ISO code that is of no other control."""
 

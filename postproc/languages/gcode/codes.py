@@ -179,9 +179,9 @@ CODES = define(
         "GCO019": Code(
             "warning",
             "origin is not known",
-            meaning="G92 sets the coordinates of a position that is not known.",
+            meaning="Something that is not read moves the origin, or G92 sets it where the position is not known.",
             consequence="The motions after it have no known place, so they are not corrected.",
-            action="Move to known X, Y and Z before G92, or remove G92 and define the base in the cell.",
+            action="Move to known X, Y and Z before it, or remove it and define the base in the cell.",
             example="`G92 X0 Y0` as the first block.",
         ),
         "GCO020": Code(
@@ -217,7 +217,10 @@ CODES = define(
         "GCO023": Code(
             "info",
             "length of another tool",
-            meaning="G43 names an H number that is not the tool's number; the cell's tool is used.",
+            meaning=(
+                "G43 names an H number that is not the tool's number, or no G43 follows the change of the tool; the "
+                "cell's tool is used."
+            ),
             consequence="With another length the tool tip would be elsewhere.",
             action="Check that the cell's tool has the intended length.",
             example="`T3 M6`, then `G43 H5`.",
@@ -357,6 +360,14 @@ CODES = define(
             consequence="The motion is not corrected.",
             action="Correct positions only, or let the post-processor write rotary words in this block.",
             example="A block with X, Y, Z only, whose correction tilts the tool.",
+        ),
+        "GCW004": Code(
+            "warning",
+            "line would be too long",
+            meaning="With the digits of the correction the line has more characters than the control reads.",
+            consequence="The motion is not corrected, because the control would stop at the line.",
+            action="Write a shorter comment in the line, or the comment in a line of its own.",
+            example="A line of 250 characters under LinuxCNC.",
         ),
     }
 )

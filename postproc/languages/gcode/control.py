@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any, NamedTuple
 
@@ -48,6 +48,7 @@ class Group(IntEnum):
     OVERRIDE = 28  # 0; else F is not the feed (OVR)
     FEED_AXES = 29  # 0 F is that of X, Y, Z; else of other axes too, or not of all (FGROUP)
     PLACED = 30  # 0; else coordinates are those of a plane that the program states (G68, G68.2 of a Fanuc)
+    ORIENTED = 41  # tool vectors are in the coordinates of 0 the part, 1 the machine (ORIMKS)
     EULER = 40  # what A2= B2= C2= are: 0 Euler angles (Z X' Z''), 1 RPY angles (Z Y' X'')
 
 
@@ -152,7 +153,8 @@ class ProgrammedFrame:
 
     turn (3, 3): a rotation, also scaled or mirrored; shift (6,) [m, rad], NaN where not known; memory: what the
     control itself remembers.  rotary (3,) [rad]: where the block that starts it leaves the rotary axes, NaN where not
-    known; None where they stay.
+    known; None where they stay.  reflection (3, 3): of what ``turn`` does the mirroring, in the axes of the base, after
+    its rotations.
     """
 
     turn: Floats
@@ -160,6 +162,14 @@ class ProgrammedFrame:
     memory: Any = None
     tool: ToolAxis = ToolAxis.STATED
     rotary: Floats | None = None
+    reflection: Floats = field(default_factory=lambda: np.eye(3))
+
+    def mirrored(self, factors: Floats) -> ProgrammedFrame:
+        """With the coordinates of some axes reversed: ``factors`` (3,), 1 or -1, in this frame."""
+        axes = self.reflection.T @ self.turn
+        axes = axes / np.linalg.norm(axes, axis=0)  # they may be scaled
+        reflection = self.reflection @ (axes @ np.diag(factors) @ axes.T)
+        return replace(self, turn=self.turn @ np.diag(factors), reflection=reflection)
 
     def to_base(self, programmed: Floats) -> Floats:
         """(..., 6) [m, rad] of ``programmed`` (..., 6) in the base."""
@@ -188,11 +198,13 @@ class ProgrammedFrame:
 
 def either_frame(one: ProgrammedFrame, other: ProgrammedFrame) -> ProgrammedFrame:
     """What is known where one of two frames is in force, ``other`` after a block that may run: what both have."""
-    same = (one.shift == other.shift) & np.array_equal(one.turn, other.turn)
+    alike = np.array_equal(one.turn, other.turn) and np.array_equal(one.reflection, other.reflection)
+    same = (one.shift == other.shift) & alike
     memory = _either_memory(one.memory, other.memory)
     tool = one.tool if one.tool == other.tool else ToolAxis.UNKNOWN
     rotary = None if other.rotary is None else np.full(3, np.nan)
-    return ProgrammedFrame(other.turn, np.where(same, one.shift, np.nan), memory, tool, rotary)
+    shift = np.where(same, one.shift, np.nan)
+    return ProgrammedFrame(other.turn, shift, memory, tool, rotary, other.reflection)
 
 
 def _either_memory(one: Any, other: Any) -> Any:
@@ -251,7 +263,10 @@ class Control:
     expressions, None where these are not read; radius_gap [m]: by how much the radii of an arc at its start and end may
     differ where mm and where inch are in force; drills: codes of the cycles that go to R, to the depth that the axis
     normal to the plane states, and back.  states_tool: the M code whose Q is the number of the tool that is loaded;
-    keeps_length: M6 with the tool that is loaded already changes no coordinate.
+    saves_modes: M70 to M73 save and restore what is in force; keeps_length: M6 with the tool that is loaded already
+    changes no coordinate; longest_line: bytes of a line with its end that the control reads, None where its manuals
+    state none; increments_by_setting: whether an increment after a change of the frame starts at the place of the tool
+    or at its coordinates from before it, is a setting.
     """
 
     name: str
@@ -285,3 +300,6 @@ class Control:
     drills: frozenset[int] = frozenset()
     states_tool: int | None = None
     keeps_length: bool = False
+    saves_modes: bool = False
+    longest_line: int | None = None
+    increments_by_setting: bool = False

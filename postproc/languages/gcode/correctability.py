@@ -12,11 +12,12 @@ from postproc.base.byte_search import occurrences
 from postproc.base.document import Document
 from postproc.languages.gcode.block_arcs import unevenly_scaled
 from postproc.languages.gcode.blocks import AXES, FRAMED, BlockWords, Reasons, What, framed
-from postproc.languages.gcode.control import Feed, Group, Move, Once
+from postproc.languages.gcode.control import FIRST_NAME, UNKNOWN, Feed, Group, Move, Once
 from postproc.languages.gcode.drill_cycles import refuse_cycles
 from postproc.languages.gcode.execution import Execution
 from postproc.languages.gcode.execution_flow import FlowReason
 from postproc.languages.gcode.feeds import feeds_before_units
+from postproc.languages.gcode.modal import decode_g_codes
 from postproc.languages.gcode.motions import GcodeMotions
 from postproc.languages.gcode.numbered import TOOL_CHANGE
 from postproc.languages.gcode.positions import Positions
@@ -113,7 +114,7 @@ def check_correctability(
         ("corner", "GCO016", "the control rounds or chamfers this corner"),
         ("assign", "GCO005", "the block sets a variable"),
         ("axis", "GCO004", "the block names axes of the machine"),
-        ("polar", "GCO010", "the coordinates are polar"),
+        ("polar", "GCO010", "the target is stated by an angle or in polar coordinates (AP, RP, AR, ANG)"),
     ):
         refuse(words.noted(kind)[rows], code, message)
     refuse(
@@ -145,6 +146,11 @@ def check_correctability(
         np.isin(moves.move, (Move.SPLINE, Move.THREAD, Move.OTHER)),
         "GCO016",
         "the block is a spline, a thread or another motion of the control",
+    )
+    refuse(
+        force[Group.RADIUS] == UNKNOWN,
+        "GCO009",
+        "it is not known whether tool radius compensation is active, in which the contour is not the tool's path",
     )
     refuse(
         force[Group.RADIUS] != 0,
@@ -276,7 +282,7 @@ def _positions(
             )
             what = "" if cause < 0 or reasons.of[cause] < 0 else reasons.texts[reasons.of[cause]]
             if cause >= 0 and not what:
-                what = What.ORIGIN
+                what = _unsaid(words, cause)
             message = f"{names}: {why}{f' ({what})' if what else ''}"
             help_ = f"state {names} under program_start: in the cell, or {_WRITE}" if cause < 0 else ""
             if what == What.LENGTH and cause == first_change:
@@ -287,13 +293,23 @@ def _positions(
     collector.refuse(
         np.any(frame, axis=1),
         "GCO019",
-        "the coordinates are not known: G92 follows an unknown position, or a frame is not read",
+        "the origin of the coordinates is not known: what moves it is not read, or the position is not known there",
     )
+
+
+def _unsaid(words: BlockWords, block: int) -> str:
+    """What left a coordinate unknown in a block of the program that says nothing of that by itself."""
+    codes = words.source.column(key("G")).part(block, block + 1).value
+    if not (decode_g_codes(codes, words.control)[2] == Group.ONCE).any():
+        return What.INCREMENT if words.control.increments_by_setting else What.ORIGIN
+    return What.FRAME if (codes >= FIRST_NAME).any() else What.ORIGIN
 
 
 def bind_names(execution: Execution) -> str:
     """What to do about names whose values were wanted and are not known."""
-    names = [name for name in execution.unknown if not name.startswith(("#<_", "$"))]
+    names = [
+        name for name in execution.unknown if len(name) > 1 and not name.startswith(("#<_", "$"))
+    ]  # an axis is an index: $AA_IM[X]
     if not names:
         return ""
     shown = ", ".join([*names[:5], *(["..."] if len(names) > 5 else [])])
@@ -369,6 +385,7 @@ def no_insert_before(words: BlockWords, rows: Ints, in_other_file: Bools) -> dic
         (more, "its block contains more than the motion"),
         (modal.flow.entered, "a jump leads to its block"),
         (feeds_before_units(words), "its F is in the unit from before it"),
+        (words.noted("feed"), "its FB states the feed of one block"),
     ):
         found.update(dict.fromkeys(np.flatnonzero(mask[rows]).tolist(), why))
     return found

@@ -13,7 +13,7 @@ from postproc.languages.gcode.cell_options import INTEGER_WORDS
 from postproc.languages.gcode.control import Group, Move, Once
 from postproc.languages.gcode.correctability import UNUSED, code_name
 from postproc.languages.gcode.execution_flow import CALLS, FlowReason
-from postproc.languages.gcode.numbered import written_lengths
+from postproc.languages.gcode.numbered import outdated_lengths, written_lengths
 from postproc.languages.gcode.words import How, key
 
 KNOWN_M = (
@@ -79,9 +79,11 @@ def diagnostics(
     hidden = modal.states & (words.move == Move.OTHER) & ~motion & ~probing & words.control.iso
     add(hidden, "GCO016", "the block may be a motion of the control without words of axes")
     calls, m = none.copy(), words.words(key("M"))
-    calls[m.block[np.isin(m.value, CALLS)]] = True
+    calls[m.block[np.isin(m.value, CALLS[1:] if words.control.saves_modes else CALLS)]] = True
     calls |= modal.has(Once.CALL) | words.noted("call") | words.has(*words.control.calls)
     add(calls & ~modal.flow.called, "GCO007", "the block calls code that is not read")
+    restored = np.flatnonzero(modal.flow.restored) - 1
+    add_at(restored[restored >= 0], "GCO007", "modes come back here that are not known (M72, M73)")
     add(words.noted("cycle"), "GCO008", "the block calls a cycle of the control")
     strange_m = ~np.isin(m.value, KNOWN_M) & live[m.block]
     if strange_m.any():
@@ -98,14 +100,14 @@ def diagnostics(
     add(
         words.noted("base"),
         "GCO024",
-        "the program writes a work offset; the cell's base of its number is used",
+        "the program writes a work offset: where it is then is not known, whatever the cell states of its number",
     )
     data = words.noted("tool data")
     data[[block for block, _ in written_lengths(words)]] = True
     add(
         data,
         "GCO024",
-        "the program writes data of tools; the cell's tool of the same number is used",
+        "the program writes data of tools: the cell's tool of the same number is used, but for one used before it",
     )
     named_tools: dict[str, list[int]] = {}
     for note in words.source.notes:
@@ -145,4 +147,7 @@ def diagnostics(
         edges = words.number(words.control.offsets) > 1
         add(edges, "GCO023", "D is not the first edge of the tool; the length of the cell's tool is used")
     add(other, "GCO023", "H has another number than the tool; the length of the cell's tool is used")
+    cutting = motion & ~np.isin(words.move, (Move.RAPID, Move.NOTHING)) & ~other
+    message = "no G43 follows the tool change: the length of another tool is active; that of the cell's tool is used"
+    add(cutting & outdated_lengths(words, loaded), "GCO023", message)
     return findings

@@ -16,7 +16,9 @@ from postproc.base.arrays import Bools, Ints
 from postproc.languages.gcode.control import Control
 from postproc.languages.gcode.execution_flow import (
     LOCAL,
-    SAVES_FOR_A_CALL,
+    MODE_CODES,
+    NONE_SAVED,
+    RETURNS,
     FlowReason,
     program_starts,
     tape_blocks,
@@ -26,13 +28,11 @@ from postproc.languages.gcode.integer_words import PLAIN_INTEGERS, IntegerWords
 from postproc.languages.gcode.run_calls import RunAgain
 from postproc.languages.gcode.run_flow import RunFlow
 from postproc.languages.gcode.run_state import SUBPROGRAM
-from postproc.languages.gcode.source import Source
+from postproc.languages.gcode.source import MACRO, Source
 from postproc.languages.gcode.statements import NotFollowed, Structure, structure
 from postproc.languages.gcode.variable_values import VariableValues
 from postproc.languages.gcode.words import key
 
-MACRO = 65
-"""G65 calls as M98, with values for variables."""
 RESTARTS = 20
 """How often a program is followed again with more that may run or not."""
 MOST_STEPS = 100_000
@@ -66,9 +66,11 @@ class Execution:
     block; reached (R, 2): steps before which the run comes to a block that does not run then, and that block.
     perhaps (P, 4): first and last step of what is written before their blocks and may be passed or not, the number of
     the branch or loop that it is a part of, and what else is known of it (STRAIGHT, ONE_ARM_RUNS).
-    folded: the words whose values are put in.  unknown: names whose value was
-    wanted and is not known, and the block where it was first.  missing: names of programs that are called and are not
-    in the text."""
+    saved (S, 2): as of ``ExecutionFlow``.  restarts: blocks of the text with a M99 of the main program that leads
+    back; second_pass: the step with which it runs the second time, -1 where it does not.
+    folded: the words whose values are put in.  unknown: names whose value was wanted and is not known, which the cell
+    may state as no block sets them, and the block where it was first.  missing: names of programs that are called and
+    are not in the text."""
 
     text: Source
     source: Source
@@ -85,6 +87,9 @@ class Execution:
     arrivals: Ints = field(default_factory=lambda: np.empty(0, np.int64))
     reached: Ints = field(default_factory=lambda: np.empty((0, 2), np.int64))
     perhaps: Ints = field(default_factory=lambda: np.empty((0, 4), np.int64))
+    saved: Ints = field(default_factory=lambda: NONE_SAVED)
+    restarts: tuple[int, ...] = ()
+    second_pass: int = -1
 
 
 def execute(
@@ -93,10 +98,11 @@ def execute(
     symbols: Mapping[str, object],
     own: int | None = None,
     integers: IntegerWords = PLAIN_INTEGERS,
+    again: int | None = None,
 ) -> Execution:
     """The run of a program; ``symbols``: values of names that only the controller knows; own: blocks of the program
     itself: those after them are of other files, and where they do not run they are not in the run; integers: what
-    lengths without a decimal point mean."""
+    lengths without a decimal point mean; again: one of ``restarts``, after which it runs a second time."""
     n = len(source.blocks)
     nothing = np.zeros(n, np.bool_)
     tape = tape_blocks(source)
@@ -109,28 +115,31 @@ def execute(
     noted = {note.kind for note in source.notes}
     m = source.column(key("M"))
     calls = (
-        np.isin(m.value, (SUBPROGRAM, LOCAL)).any()
+        np.isin(m.value, (SUBPROGRAM, LOCAL, *RETURNS)).any()
         or (source.column(key("G")).value == MACRO).any()
         or (control.calls and source.mask(*control.calls).any())
+        or (control.saves_modes and np.isin(m.value, MODE_CODES).any())
     )
     if not noted & {"value", "assign", "if", "open", "close", "while", "jump", "call"} and not calls:
         return plain
-    follows = not (m.value == SAVES_FOR_A_CALL).any()
     known = {name: float(value) for name, value in symbols.items() if isinstance(value, int | float)}
+    wanted: dict[str, int] = {}
     try:
-        if not follows:
-            raise NotFollowed
         shape = structure(source.notes)
         opaque: set[int] = set()
         steps = 0
         for _ in range(RESTARTS):
             run = RunFlow(
-                source, control, VariableValues(language, known, control.name), shape, opaque, integers
+                source, control, VariableValues(language, known, control.name), shape, opaque, integers, again
             )
             try:
                 return _result(run, run.follow(), True, own)
             except RunAgain:
                 steps += run.steps
+            except NotFollowed:
+                if run.lacks_count:
+                    wanted = run.unknown
+                raise
             if steps > MOST_STEPS + 4 * len(run.special):
                 break
     except NotFollowed:
@@ -143,6 +152,7 @@ def execute(
         set(),
         integers,
     )
+    run.unknown.update(wanted)
     return _in_text_order(run)
 
 
@@ -220,4 +230,7 @@ def _result(run: RunFlow, stop: int, followed: bool, own: int | None = None) -> 
         np.array(run.jumped, np.int64),
         np.array(run.reached, np.int64).reshape(-1, 2),
         np.array(run.conditional, np.int64).reshape(-1, 4),
+        np.array(run.saved, np.int64).reshape(-1, 2),
+        tuple(dict.fromkeys(run.restarts)),
+        run.second_pass,
     )

@@ -10,14 +10,20 @@ from functools import cached_property
 import numpy as np
 
 from postproc.base.arrays import Bools, Ints
+from postproc.languages.gcode.modal_fill import fill_modal
 from postproc.languages.gcode.source import Source
 from postproc.languages.gcode.words import key
 
 _JUMP = re.compile(r"GOTO[BFC]?\s*(N?\d+|[A-Z_]\w+)?|REPEATB?\s*(N?\d+|[A-Z_]\w+)?(?:\s+([A-Z_]\w+))?", re.I)
 _ZEROS = re.compile(r"^N?0*(?=\d)")
-SAVES, RESTORES, SAVES_FOR_A_CALL = 70, 72, 73
-"""Of LinuxCNC: M72 brings back modes that M70 has saved; M73 has the end of its subprogram do so."""
+_STRING = re.compile(r'"\w+"')
+SAVES, INVALIDATES, RESTORES, SAVES_FOR_A_CALL = 70, 71, 72, 73
+"""Of LinuxCNC: M72 brings back modes that M70 or M73 has saved; M73 has the end of its subprogram do so, too."""
+MODE_CODES = (SAVES, INVALIDATES, RESTORES, SAVES_FOR_A_CALL)
+NEVER, UNCLEAR = -1, -2
+"""In place of the step at which modes were saved: nothing is restored; what is restored is not known."""
 CALLS = (RESTORES, 97, 98, 198)
+"""M that call code; M72 where it does not restore modes."""
 LOCAL = 97
 RETURNS = (99,)
 
@@ -26,6 +32,12 @@ STRAIGHT, ONE_ARM_RUNS = 1, 2
 """Of what may be passed or not: nothing in it goes elsewhere; it is an arm of a branch of which one surely runs."""
 
 _ENDS = (2, 17, 30, *RETURNS)
+
+MODAL, MODAL_EACH, MODAL_END = 66.0, 66.1, 67.0
+"""Of a Fanuc: every motion calls a macro; every block does, and its words are arguments; none does any more."""
+EACH = 2
+
+NONE_SAVED = np.empty((0, 2), np.int64)
 
 
 class FlowReason(IntEnum):
@@ -45,7 +57,9 @@ class ExecutionFlow:
     """reason (B,) FlowReason; forget (B,): before it other code ran that was not read; calls (B,): runs it; called
     (B,): calls code of the file, which runs after it; tape (B,): belongs to the program; entered (B,): a jump leads
     to it, past what is before it; repeated (B,): its line runs in other
-    blocks as well; restored (B,): before it modes were brought back that are not followed."""
+    blocks as well; restored (B,): before it modes were brought back that are not followed; saved (S, 2), of the whole
+    run, never of a part: the step of a call, or of M70 or M73, and the one before which what was in force there is
+    restored, the second ascending."""
 
     reason: Ints
     forget: Bools
@@ -55,9 +69,11 @@ class ExecutionFlow:
     entered: Bools
     repeated: Bools
     restored: Bools
+    saved: Ints
 
     def part(self, start: int, stop: int) -> ExecutionFlow:
-        return ExecutionFlow(*(getattr(self, one.name)[start:stop] for one in fields(self)))
+        rows = {one.name: getattr(self, one.name)[start:stop] for one in fields(self)}
+        return ExecutionFlow(**{**rows, "saved": NONE_SAVED})
 
     @cached_property
     def last(self) -> Ints:
@@ -67,6 +83,17 @@ class ExecutionFlow:
         following = np.where(sure, np.arange(n + 1), n)
         following = np.minimum.accumulate(following[::-1])[::-1]
         return np.where(sure[:-1], np.arange(n), following[:-1] - 1)
+
+
+def macro_modes(source: Source) -> Ints:
+    """(B,) 1 in blocks under G66, in which motions call a macro, EACH under G66.1, in which all do, else 0."""
+    codes, n = source.column(key("G")), len(source.blocks)
+    some = np.isin(codes.value, (MODAL, MODAL_EACH, MODAL_END))
+    if not some.any():
+        return np.zeros(n, np.int8)
+    value = codes.value[some]
+    kind = np.where(value == MODAL, 1, np.where(value == MODAL_EACH, EACH, 0))
+    return np.asarray(fill_modal(n, codes.block[some], kind, 0, np.int8))
 
 
 def tape_blocks(source: Source) -> Bools:
@@ -128,6 +155,33 @@ def uncertain_stretches(source: Source, entered: Bools | None = None) -> list[tu
                     entered[at[1:]] = True
     if stack:
         found.append((stack[0][0], n))
+    return found + _main_returns(source, found)
+
+
+def _main_returns(source: Source, found: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """The ranges of blocks that M99 of the main program passes, or may repeat; ``found``: those that may be
+    subprograms."""
+    n, m, numbers = len(source.blocks), source.column(key("M")), source.column(key("N"))
+    edge = np.zeros(n + 1, np.int32)
+    for start, stop in found:
+        edge[start] += 1
+        edge[stop] -= 1
+    sure = np.cumsum(edge)[:n] == 0
+    ends = m.block[np.isin(m.value, _ENDS[: -len(RETURNS)])]
+    end = min([*program_starts(source)[1:2], *ends[sure[ends]][:1].tolist()], default=n)
+    returns = m.block[np.isin(m.value, RETURNS) & (m.block < end)]
+    if not len(returns):
+        return []
+    leads = source.mask(key("P"))[returns]
+    places: dict[float, list[int]] = {}
+    for number, block in zip(numbers.value.tolist(), numbers.block.tolist(), strict=True):
+        places.setdefault(number, []).append(block)
+    found = [(0, n)] * bool((~leads).any())
+    for block, to in zip(
+        returns[leads].tolist(), source.column(key("P")).last(returns[leads]).tolist(), strict=True
+    ):
+        at = places.get(to, [])
+        found.append((block, max(at)) if at and min(at) > block else (0, n))
     return found
 
 
@@ -146,5 +200,6 @@ def _labels(source: Source) -> dict[str, list[int]]:
 
 
 def label_name(name: str) -> str:
-    """A label in upper case, of a block number the digits: N0030 and 30 are 30."""
-    return _ZEROS.sub("", name.upper())
+    """A label in upper case, of a block number the digits: N0030 and 30 are 30; "PAST" is PAST."""
+    text = name.strip().upper()
+    return _ZEROS.sub("", text[1:-1] if _STRING.fullmatch(text) else text)

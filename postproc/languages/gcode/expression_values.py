@@ -55,6 +55,12 @@ def _rounded(value: float) -> float:
     return math.nan if halves % 2 and _is_near_step(2.0 * value) else _half_away(value)
 
 
+def _whole(operator: str, a: float, b: float) -> float:
+    """MOD and DIV of whole numbers that are not negative: of others controls round or divide differently."""
+    fine = a >= 0 and b > 0 and a == math.floor(a) and b == math.floor(b)
+    return _calculate(operator, a, b) if fine else math.nan
+
+
 def _modulo(a: float, b: float) -> float:
     if _is_near_step(a / b):
         return math.nan
@@ -89,6 +95,8 @@ def _calculate(operator: str, a: float, b: float) -> float:
 
 def _calculate_rounded(operator: str, a: float, b: float) -> float:
     """The same where controls round further: they decide whether numbers that they compute are equal."""
+    if operator in ("AND", "OR", "XOR") and not {a, b} <= {0.0, 1.0}:
+        return math.nan  # bit by bit in a value, which a condition is not
     result = _calculate(operator, a, b)
     if operator in _COMPARING:
         return result if abs(a - b) > LAST_DIGITS * max(1.0, abs(a)) or are_comparable(a, b) else math.nan
@@ -134,7 +142,8 @@ _BRACKETED_LEVELS = {
 class ExpressionLanguage:
     """levels: operator -> how closely it binds; functions by name; brackets: of sub-expressions and arguments;
     numbered: variables are ``#`` and a number; logical: operands of AND and OR need brackets of their own, as controls
-    differ in what they bind; rounds: some controls have fewer digits than double precision."""
+    differ in what they bind; rounds: some controls have fewer digits than double precision; counts: MOD and DIV are
+    those of counts alone."""
 
     levels: Mapping[str, int]
     functions: Mapping[str, Callable[[float], float]]
@@ -142,6 +151,7 @@ class ExpressionLanguage:
     numbered: bool
     logical: bool = False
     rounds: bool = False
+    counts: bool = False
 
 
 LINUXCNC = ExpressionLanguage(
@@ -167,6 +177,7 @@ FANUC = ExpressionLanguage(
     True,
     logical=True,
     rounds=True,
+    counts=True,
 )
 SINUMERIK = ExpressionLanguage(
     {
@@ -180,6 +191,7 @@ SINUMERIK = ExpressionLanguage(
     {**_FUNCTIONS, "TRUNC": _stepped(lambda x: float(math.trunc(x))), "POT": lambda x: x * x},
     ("(", ")"),
     False,
+    counts=True,
 )
 _SAME = {"==": "EQ", "<>": "NE", ">": "GT", ">=": "GE", "<": "LT", "<=": "LE"}
 
@@ -262,6 +274,8 @@ class _ExpressionParser:
             name = _SAME.get(operator, operator)
             if math.isnan(value) or math.isnan(other):
                 value = math.nan
+            elif language.counts and name in ("MOD", "DIV"):
+                value = _whole(name, value, other)
             elif language.rounds:
                 value = _calculate_rounded(name, value, other)
             else:

@@ -6,8 +6,9 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.units import MM
-from postproc.languages.gcode.blocks import INCH, BlockWords
+from postproc.languages.gcode.blocks import AXES, INCH, BlockWords
 from postproc.languages.gcode.control import Feed, Group, Once
+from postproc.languages.gcode.execution_flow import NONE_SAVED, FlowReason
 from postproc.languages.gcode.modal_fill import lookup
 from postproc.languages.gcode.source import WordColumn
 from postproc.languages.gcode.words import key
@@ -34,13 +35,56 @@ class Feeds:
             unit = np.array(self._unit)
             unit[late] = self._unit[late - 1]
             self._unit = unit
-        self._rate, self._spindle = (self._outside(words.words(key(letter))) for letter in "FS")
+        rate, spindle = (
+            self._restored(self._outside(words.words(key("F")))),
+            self._restored(self._speeds_of_spindle()),
+        )
+        self._rate, self._spindle = (_surely(column, _uncertain(words)) for column in (rate, spindle))
+        other = words.modal.flow.forget | words.modal.flow.restored
+        calls = np.where(other, np.arange(len(words)), -1)
+        self._called = np.maximum.accumulate(calls)  # code that is not read may state F and S
+        surface = np.where(self._force[Group.SPINDLE] != 0, np.arange(len(words)), -1)
+        self._surface = np.maximum.accumulate(surface)
 
     def _outside(self, column: WordColumn) -> WordColumn:
         keep = ~self._dwell[column.block]
-        if keep.all():
+        return column if keep.all() else column.where(keep)
+
+    def _restored(self, column: WordColumn) -> WordColumn:
+        """The words with NaN where M72 or M73 brings back another one: controls round what they bring back."""
+        words = self._given
+        saved = words.modal.flow.saved if words.control.saves_modes else NONE_SAVED
+        first, last = saved[saved[:, 1] < len(words)].T
+        back = last[np.searchsorted(column.block, first) < np.searchsorted(column.block, last)]
+        if not len(back):
             return column
-        return WordColumn(column.block[keep], column.value[keep], column.how[keep])
+        block = np.concatenate([back, column.block])
+        order = np.argsort(block, kind="stable")
+        value = np.concatenate([np.full(len(back), np.nan), column.value])[order]
+        return WordColumn(block[order], value, np.zeros(len(block), np.int8))
+
+    def _speeds_of_spindle(self) -> WordColumn:
+        """The words S that are speeds, and those of which it is not known what they are, with NaN: S beside a shift of
+        the origin alone is a limit (G92 S, G50 S), as it is beside G25 and G26 of a Sinumerik; S1= names a spindle."""
+        words = self._given
+        codes, limits = words.words(key("G")), words.modal.has(Once.SHIFT) & ~words.has(*AXES)
+        limits[codes.block[np.isin(codes.value, _LIMITS)]] |= words.control.further
+        column = self._outside(words.words(key("S")))
+        column = column.where(~limits[column.block])
+        unclear = words.modal.has(Once.SHIFT) | (self._force[Group.SPINDLE] != 0)
+        named = np.flatnonzero(words.has(*(key("S", index) for index in range(10))))
+        value = np.where(unclear[column.block], np.nan, column.value)
+        block = np.concatenate([column.block, named])
+        order = np.argsort(block, kind="stable")
+        value = np.concatenate([value, np.full(len(named), np.nan)])[order]
+        return WordColumn(block[order], value, np.zeros(len(block), np.int8))
+
+    def _turns(self, blocks: Ints) -> Floats:
+        """(N,) [1/min] what S states in blocks (N,); NaN at a constant surface speed, and after one until it is stated
+        again."""
+        at, turns = _latest(self._spindle, blocks)
+        turns[(at <= self._surface[blocks]) | (at < self._called[blocks])] = np.nan
+        return turns
 
     def of(self, blocks: Ints, length: Floats) -> Floats:
         """(N,) [m/s] of the motions in blocks of the program (N,); NaN where it is not known.
@@ -53,9 +97,8 @@ class Feeds:
         at, number = _latest(self._rate, blocks)
         rate = np.where(number > 0, number * self._unit[at], np.nan)
         # F means another thing in another mode, and has to be stated again there.
-        rate[mode[at] != here] = np.nan
-        _, turns = _latest(self._spindle, blocks)
-        turns[self._force[Group.SPINDLE][blocks] != 0] = np.nan
+        rate[(mode[at] != here) | (at < self._called[blocks])] = np.nan
+        turns = self._turns(blocks)
         own = self._given.words(key("F")).last(blocks)
         result = np.where(here == Feed.PER_TURN, rate * turns, rate)
         inverse_time = np.where(length > 0, length, np.nan) * np.where(own > 0, own, np.nan)
@@ -68,12 +111,8 @@ class Feeds:
 
     def speeds(self, blocks: Ints) -> Floats:
         """(N,) [rad/s] of the spindle in blocks of the program (N,): the S that is in force, below zero after M4, 0
-        after M5; NaN, after M4 -inf, where no S is, at a constant surface speed, and where an S may be the limit of a
-        block that shifts the origin (G92 S)."""
-        column, keep = self._spindle, ~self._given.modal.has(Once.SHIFT)[self._spindle.block]
-        stated = WordColumn(column.block[keep], column.value[keep], column.how[keep])
-        _, turns = _latest(stated, blocks)
-        turns[self._force[Group.SPINDLE][blocks] != 0] = np.nan
+        after M5; NaN, after M4 -inf, where it is not known."""
+        turns = self._turns(blocks)
         codes = self._given.words(key("M"))
         switches = np.isin(codes.value, (3.0, 4.0, 5.0))
         at = np.searchsorted(codes.block[switches], blocks, side="right") - 1
@@ -83,6 +122,8 @@ class Feeds:
         return np.where(switch == 5.0, 0.0, np.where(back, -size, size))
 
 
+_LIMITS = (25.0, 26.0)
+"""G of a Sinumerik whose S is a limit."""
 _HALTS = (0.0, 1.0, 60.0)
 """M that stop the program when their block has ended."""
 _FLOW = (2.0, 17.0, 30.0, 97.0, 98.0, 99.0)
@@ -111,6 +152,23 @@ def with_stops(blend: Floats, words: BlockWords, rows: Ints) -> Floats:
     return result
 
 
+def _uncertain(words: BlockWords) -> Bools:
+    """(B,) blocks that may run or not."""
+    return np.isin(words.modal.flow.reason, (FlowReason.DELETED, FlowReason.FLOW))
+
+
+def _surely(column: WordColumn, uncertain: Bools) -> WordColumn:
+    """The words with NaN after one that states another value in a block that may run or not, uncertain (B,)."""
+    maybe = uncertain[column.block]
+    if not maybe.any():
+        return column
+    place = np.arange(len(column))
+    sure = np.maximum.accumulate(np.where(maybe, -1, place))
+    before = np.append(column.value, np.nan)[sure]
+    other = np.maximum.accumulate(np.where(maybe & (column.value != before), place, -1))
+    return WordColumn(column.block, np.where(other > sure, np.nan, column.value), column.how)
+
+
 def _latest(column: WordColumn, blocks: Ints) -> tuple[Ints, Floats]:
     """The blocks (N,) that state what holds in ``blocks`` (N,), and what; 0 and NaN where none does."""
     at = np.searchsorted(column.block, blocks, side="right") - 1
@@ -121,7 +179,9 @@ def blend_tolerances(words: BlockWords) -> tuple[Ints, Floats]:
     """Blocks with a G64 (K,), and what its P allows [m] (K,), NaN where nothing bounds it."""
     codes = words.words(key("G"))
     says = codes.block[codes.value == 64.0]
-    return says, words.lengths(key("P"))[says] if len(says) else np.empty(0)
+    if not len(says):
+        return says, np.empty(0)
+    return says, np.where(_uncertain(words)[says], np.nan, words.lengths(key("P"))[says])
 
 
 def blends(words: BlockWords, rows: Ints, allowed: tuple[Ints, Floats]) -> Floats:

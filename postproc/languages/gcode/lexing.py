@@ -22,6 +22,8 @@ LONGEST = 40
 """Bytes of a number; what is longer is none."""
 FARTHEST = 1e7
 """Units of a coordinate; with a greater one doubles do not hold the digits that are written, and it is not read."""
+CODES = np.frombuffer(b"GMNO", np.uint8).astype(np.int64)
+"""Letters of codes, of block numbers and of programs."""
 COORDINATES = np.frombuffer(b"XYZABCIJKRUVWE", np.uint8).astype(np.int64)
 """Letters of what is or makes a coordinate."""
 
@@ -253,11 +255,15 @@ def _in_order(plain: _Plain, other: _Plain) -> _Plain:
 
 
 def _with_exponent(words: _Plain) -> Bools:
-    """Which words ``X1e-05`` are: C programs read the exponent, LinuxCNC an address E; X1E0.5 is the latter alone."""
+    """Which words ``X1e-05`` are: C programs read the exponent, LinuxCNC an address E.  X1E0.5 is the latter alone; so
+    are G92E0, as no program writes the number of a code so, and X50E8, which no machine reaches as a number."""
+    named = ~np.isin(words.key[:-1], CODES) & (words.start[:-1] >= 0)
     exponent = (
         (words.key[1:] == ord("E")) & (words.how[1:] == How.INTEGER) & (words.at[1:] == words.stop[:-1])
     )
-    return np.append(exponent & (words.start[:-1] >= 0), np.zeros(min(len(words.key), 1), np.bool_))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reached = ~(np.log10(np.abs(words.value[:-1])) + words.value[1:] > np.log10(FARTHEST))
+    return np.append(named & exponent & reached, np.zeros(min(len(words.key), 1), np.bool_))
 
 
 def _joined(

@@ -12,7 +12,7 @@ from postproc.base.arrays import Bools, Floats, Ints
 from postproc.languages.gcode.certain_flow import follow
 from postproc.languages.gcode.control import UNKNOWN, Control, Group, ModalCode, Move, Once
 from postproc.languages.gcode.execution import Execution
-from postproc.languages.gcode.execution_flow import ExecutionFlow, FlowReason
+from postproc.languages.gcode.execution_flow import NONE_SAVED, ExecutionFlow, FlowReason
 from postproc.languages.gcode.modal_fill import everywhere, fill_modal, switched
 from postproc.languages.gcode.source import Source, WordColumn
 from postproc.languages.gcode.words import key
@@ -48,6 +48,17 @@ _ARGUMENTS = np.array(
 _FORGOTTEN = (Group.MOTION, Group.PLANE, Group.DISTANCE, Group.FEED, Group.OFFSET)
 """What other code leaves in another state; that it leaves units, a tool radius or what I J K are in another one is not
 assumed."""
+_SAVED = (
+    Group.MOTION, Group.PLANE, Group.DISTANCE, Group.UNITS, Group.FEED, Group.FEED_UNITS, Group.OFFSET, Group.PATH,
+    Group.RADIUS, Group.DIAMETER, Group.AXIAL, Group.EULER, Group.ORIENTED, Group.SPINDLE,
+)  # fmt: skip
+"""What SAVE of a subprogram restores: G functions, not transformations and values of words (Siemens, programming
+manual "job planning", SAVE)."""
+_RESTORED = (
+    Group.PLANE, Group.DISTANCE, Group.ARCS, Group.UNITS, Group.FEED, Group.FEED_UNITS, Group.OFFSET, Group.PATH,
+    Group.RETURN, Group.LENGTH, Group.LENGTHS, Group.RADIUS, Group.DIAMETER, Group.SPINDLE,
+)  # fmt: skip
+"""What M72 and M73 restore: not what kind of motion it is (LinuxCNC, M codes, "Save Modal State")."""
 CALLING_M = (96, 97, 98, 99, 198)
 """M codes that have a P."""
 _FARTHEST_OFFSET = 1e6
@@ -153,7 +164,7 @@ def modal(execution: Execution, control: Control, base: int | None = None) -> Mo
         if one in (Group.ONCE, Group.NONE):
             continue
         own = groups == one
-        fill = _Fill(flow, start.get(one, 0), one)
+        fill = _Fill(flow, start.get(one, 0), one, control.saves_modes)
         if one == Group.MOTION:
             force[one] = _moves(fill, blocks[own], values[own], control.cycle_apart)
         else:
@@ -324,10 +335,12 @@ def _rows(n: int, rows: Ints) -> Ints:
 class _Fill:
     """Fills codes forward; what uncertain blocks change, and what follows code that was not read, is unknown."""
 
-    def __init__(self, flow: ExecutionFlow, start: int, group: Group) -> None:
+    def __init__(self, flow: ExecutionFlow, start: int, group: Group, saves_modes: bool = False) -> None:
         self._flow, self._start = flow, start
         self._type = np.int32 if group == Group.OFFSET else np.int8
-        self._forget = np.flatnonzero(flow.forget if group in _FORGOTTEN else flow.restored)
+        forgotten = flow.forget if group in _FORGOTTEN else np.zeros(len(flow.forget), np.bool_)
+        self._forget = np.flatnonzero(forgotten | (flow.restored if group in _RESTORED else False))
+        self._saved = flow.saved if group in (_RESTORED if saves_modes else _SAVED) else NONE_SAVED
 
     def __call__(self, at: Ints, value: Ints) -> Ints:
         n = len(self._flow.reason)
@@ -344,11 +357,18 @@ class _Fill:
         return filled
 
     def _filled(self, n: int, at: Ints, value: Ints, lost: Ints) -> Ints:
-        if len(lost):
+        calls, returns = self._saved[self._saved[:, 1] < n].T
+        if len(lost) or len(returns):
             # What a block itself says holds in it.
-            order = np.argsort(np.concatenate([lost, at]), kind="stable")
-            value = np.concatenate([np.full(len(lost), UNKNOWN), value])[order]
-            at = np.concatenate([lost, at])[order]
+            order = np.argsort(np.concatenate([returns, lost, at]), kind="stable")
+            value = np.concatenate([np.zeros(len(returns), np.int32), np.full(len(lost), UNKNOWN), value])[
+                order
+            ]
+            at = np.concatenate([returns, lost, at])[order]
+            restoring = np.flatnonzero(order < len(returns))
+            before = np.searchsorted(at, calls[order[restoring]], side="right") - 1
+            for row, last in zip(restoring.tolist(), before.tolist(), strict=True):
+                value[row] = value[last] if last >= 0 else self._start
         return fill_modal(n, at, value, self._start, self._type)
 
 

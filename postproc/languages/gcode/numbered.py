@@ -24,6 +24,10 @@ OFFSET_LEVELS = (2.0, 20.0)
 LENGTH_CODES = (43.0, 43.4, 43.5, 234.0)
 SYSTEM = ((5201, 5400), (7001, 7999), (14001, 20000))
 """Variables that are work offsets: of Fanuc and Haas (7001, 14001: G54.1 Pn), 5211 to 5400 of LinuxCNC."""
+FANUC_SYSTEM = ((2401, 2999), (3005, 3005), (5500, 5700), (26000, 26999), (100001, 115350))
+"""Further ones of a Fanuc: work offsets by their old numbers (2500 to 2806; 2401 on: offsets of tools of lathes), the
+setting of mm or inch, offsets of fixtures on a rotary table, errors of set-up, work offsets of many axes (operator's
+manuals of the series 0i, 16i and 30i, system variables)."""
 LENGTHS = ((2000, 2200), (2200, 2400), (10000, 10999), (11000, 11999))
 """Variables of a Fanuc after the first number are lengths of tools, or the wear of these, up to the second."""
 
@@ -157,27 +161,25 @@ def _offset_events(words: BlockWords) -> list[tuple[int, int | None, Floats | No
             chosen = int(number) or int(base[block])
             events.append((block, chosen, values[block] if kind == 2 and read[block] else None))
     for note in words.source.notes:
-        assigned = note.kind == "assign" and _is_offset(note.text)
+        assigned = note.kind == "assign" and _is_offset(note.text, fanuc)
         if assigned or (note.kind == "unknown" and note.text.startswith("#")):
             events.append((note.block, None, None))
-    events += [(block, number, None) for block, number in _rewritten(words, "base", _WRITTEN_BASE, base)]
+        if note.kind == "base" and (found := _WRITTEN_BASE.match(note.text)) is not None:
+            events.append((note.block, None if found[1] is None else int(found[1]), None))
     return sorted(events, key=lambda event: event[0])
 
 
-def _rewritten(
-    words: BlockWords, kind: str, pattern: re.Pattern[str], used: Ints
-) -> Iterator[tuple[int, int | None]]:
-    """Blocks whose notes of a kind write a base or tool that a motion before them has, and its number, None for any:
-    the cell can state only what it is before or after; used (B,): numbers that blocks have; pattern: of
-    notes that count, its group is the number."""
-    notes = [note for note in words.source.notes if note.kind == kind]
+def _rewritten(words: BlockWords, used: Ints) -> Iterator[tuple[int, int | None]]:
+    """Blocks that write data of a tool that a motion before them has, and its number, None for any: the cell can state
+    only what it is before or after; used (B,): numbers that blocks have."""
+    notes = [note for note in words.source.notes if note.kind == "tool data"]
     if not notes:
         return
     moving = np.flatnonzero(words.motion)
     numbers, first = np.unique(used[moving], return_index=True)
     begins = dict(zip(numbers.tolist(), moving[first].tolist(), strict=True))
     for note in notes:
-        found = pattern.match(note.text)
+        found = _WRITTEN_TOOL.match(note.text)
         if found is None:
             continue
         number = None if found[1] is None else int(found[1])
@@ -186,14 +188,15 @@ def _rewritten(
             yield note.block, number
 
 
-def _is_offset(assignment: str) -> bool:
+def _is_offset(assignment: str, fanuc: bool) -> bool:
     """Whether an assignment may write a work offset: to a variable that is one, or to one that is computed."""
     if _BASE_FRAME.match(assignment):
         return True
     target = _TARGET.match(assignment)
     if target is None or target[1] is None:
         return target is not None
-    return target[1].isdigit() and any(low <= int(target[1][:9]) <= high for low, high in SYSTEM)
+    ranges = (*SYSTEM, *FANUC_SYSTEM) if fanuc else SYSTEM
+    return target[1].isdigit() and any(low <= int(target[1][:9]) <= high for low, high in ranges)
 
 
 def tools(words: BlockWords, loaded: int | None = None) -> tuple[Ints, bool]:
@@ -241,7 +244,7 @@ def _stated_tools(words: BlockWords) -> tuple[Ints, Ints]:
 def _without_rewritten(words: BlockWords, tool: Ints) -> Ints:
     """(B,) the numbers of tools, -1 from where the program writes other lengths of a tool that it has used."""
     lost: dict[int | None, int] = {}
-    for block, number in _rewritten(words, "tool data", _WRITTEN_TOOL, tool):
+    for block, number in _rewritten(words, tool):
         lost.setdefault(number, block)
     moving = np.flatnonzero(words.motion)
     for block, number in written_lengths(words):
@@ -266,6 +269,41 @@ def written_lengths(words: BlockWords) -> Iterator[tuple[int, int]]:
                 yield note.block, int(target[1][:9]) - low
 
 
+def _stated_lengths(words: BlockWords) -> Ints:
+    """(K,) blocks that say which tool length is active: G43, and H while it is."""
+    codes = words.words(key("G"))
+    stated = words.has(key("H"))
+    stated[codes.block[np.isin(codes.value, LENGTH_CODES)]] = True
+    return np.flatnonzero(stated & (words.modal.force[Group.LENGTH] == 1))
+
+
+def outdated_lengths(words: BlockWords, tool: Ints) -> Bools:
+    """(B,) blocks in which the length of another tool than ``tool`` (B,) is active, as G43 was before the tool was
+    loaded.  G43 without H takes the loaded tool in LinuxCNC, the last H on a Fanuc."""
+    n, at = len(words), _stated_lengths(words)
+    if not len(at):
+        return everywhere(False, n)
+    if words.control.keeps_length:
+        h = words.number(key("H"))
+        number = np.where(np.isnan(h), tool, h).clip(-1, 1e9).astype(np.int32)
+    else:
+        number = _active_h(words)
+    active = fill_modal(n, at, number[at], 0, np.int32)
+    # what the block of the number itself contradicts is reported there
+    at = at if words.control.keeps_length else at[words.has(key("H"))[at]]
+    then = fill_modal(n, at, tool[at], 0, np.int32)
+    outdated = (active != 0) & (tool > 0) & (active != tool) & (then != tool)
+    return np.asarray(outdated & (words.modal.force[Group.LENGTH] == 1))
+
+
+def _active_h(words: BlockWords) -> Ints:
+    """(B,) the last number H, which is not an argument of a call or a setting; -1 where there is none."""
+    h = words.words(key("H"))
+    own = ~words.modal.has(Once.CALL, Once.SETTING)[h.block]
+    numbers = np.nan_to_num(h.value[own], nan=-1.0).clip(-1, 1e9).astype(np.int32)
+    return fill_modal(len(words), h.block[own], numbers, -1, np.int32)
+
+
 @dataclass(frozen=True, eq=False)
 class ToolLengths:
     """changes (B,): another tool length holds from the block on; off (B,): the program has switched it off."""
@@ -280,11 +318,7 @@ def tool_lengths(words: BlockWords, tool: Ints) -> ToolLengths:
     n, force = len(words), words.modal.force[Group.LENGTH]
     changes, off = switched(force, words.modal.ahead[Group.LENGTH]).copy(), force == 0
     if (force == 1).any():
-        codes = words.words(key("G"))
-        stated = np.zeros(n, np.bool_)
-        stated[codes.block[np.isin(codes.value, LENGTH_CODES)]] = True
-        stated |= words.has(key("H"))
-        at = np.flatnonzero(stated & (force == 1))
+        at = _stated_lengths(words)
         number = words.number(key("H"))[at]
         number = np.where(np.isnan(number), tool[at], number)
         # Stated again in the other unit, LinuxCNC moves the coordinates by the length in both.
@@ -299,10 +333,7 @@ def tool_lengths(words: BlockWords, tool: Ints) -> ToolLengths:
             changes[written] |= words.control.increments
         off &= np.maximum.accumulate(force == 1)
         if words.control.increments:  # length number 0 is none
-            h = words.words(key("H"))
-            own = ~words.modal.has(Once.CALL, Once.SETTING)[h.block]
-            numbers = np.nan_to_num(h.value[own], nan=-1.0).clip(-1, 1e9).astype(np.int32)
-            none = fill_modal(n, h.block[own], numbers, -1, np.int32) == 0
+            none = _active_h(words) == 0
             off = off | (none & (force == 1))
             changes |= switched(none.astype(np.int8), 0)
     else:

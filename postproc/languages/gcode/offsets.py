@@ -42,7 +42,8 @@ def one_shift(event: Event) -> ProgrammedFrame:
 
 
 def two_shifts(event: Event) -> ProgrammedFrame:
-    """Fanuc: the local shift of G52 and that of G92 add up; G92.1 clears both along the axes that it names with 0
+    """Fanuc: the local shift of G52 and that of G92 add up; G92 cancels the local shift along the axes that it names
+    (operator's manuals, "local coordinate system"); G92.1 clears both along the axes that it names with 0
     (programming manuals, "workpiece coordinate system preset")."""
     frame = event.frame
     local = np.zeros(6) if frame.memory is None else frame.memory
@@ -52,7 +53,8 @@ def two_shifts(event: Event) -> ProgrammedFrame:
         local = np.where(mentioned, given, local)
         return replace(frame, shift=rest + local, memory=local)
     if event.once & (1 << Once.SHIFT):
-        return replace(frame, shift=np.where(mentioned, event.position - given, frame.shift), memory=local)
+        shift = np.where(mentioned, event.position - given, frame.shift)
+        return replace(frame, shift=shift, memory=np.where(mentioned, 0.0, local))
     named = (
         mentioned if mentioned.any() else np.abs(frame.shift) + np.abs(local) > 0
     )  # of none it is not known

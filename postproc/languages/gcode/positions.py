@@ -6,16 +6,20 @@ two changes of the frame it is solved for all blocks at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.units import DEG, MM
 from postproc.languages.gcode.control import ProgrammedFrame, ToolAxis
 
 _LINEAR = np.arange(6) < 3
+SAME = 1e-9
+"""[m, rad] coordinates that differ by less are the same."""
 MOST = 2000
 """Changes of the frame that are followed; after them nothing is known."""
 
@@ -60,6 +64,12 @@ class Positions:
         return result
 
 
+def stated_place(words: Mapping[str, float]) -> Floats:
+    """(6,) [m, rad] where the axes are that ``words`` [mm, deg] name, NaN where that is not stated."""
+    stated = np.array([words.get(axis, math.nan) for axis in "XYZABC"])
+    return np.asarray(stated * np.repeat([MM, DEG], 3))
+
+
 class Trace:
     """Follows the coordinates of a program through its blocks, in their order."""
 
@@ -69,10 +79,12 @@ class Trace:
         events: Ints,
         change: Callable[[int, ProgrammedFrame, Floats], ProgrammedFrame],
         here: Floats | None = None,
+        increments_by_setting: bool = False,
     ) -> None:
         """here (6,) [m, rad]: where the axes are at the first block, NaN where that is not known, as without;
         events (E,): blocks that change the frame (and move nothing), ascending; ``change`` (block, frame, position
-        in the base) gives the frame after one."""
+        in the base) gives the frame after one; increments_by_setting: as of ``Control``."""
+        self._by_setting, self._undecided = increments_by_setting, np.zeros(6, np.bool_)
         self._events, self._change = events[:MOST], change
         self.frames = [first]
         self._here = np.full(6, np.nan) if here is None else here
@@ -115,7 +127,10 @@ class Trace:
         if len(self.frames) == MOST:
             frame = ProgrammedFrame(np.eye(3), np.full(6, np.nan))
         self.frames.append(frame)
-        self._here = frame.from_base(there)
+        before, self._here = self._here, frame.from_base(there)
+        if self._by_setting:
+            moved = ~(np.abs(self._here - before) < SAME) & ~(np.isnan(before) & np.isnan(self._here))
+            self._undecided = self._undecided | moved
         if frame.rotary is not None:
             self._here[3:] = frame.rotary
         self._origin = np.where(np.isnan(self._here), event, self._origin)
@@ -123,8 +138,9 @@ class Trace:
     def _scan(self, axis_words: AxisWords, piece: slice, first: int, positions: Positions) -> None:
         if piece.stop > piece.start:
             positions.start[piece], positions.end[piece], positions.source[piece] = _scan(
-                axis_words, piece, self._here, self._origin, first, self.frames[-1]
+                axis_words, piece, self._here, self._origin, first, self.frames[-1], self._undecided
             )
+            self._undecided = self._undecided & ~axis_words.sets[piece].any(axis=0)
             self._here, self._origin = (
                 positions.end[piece.stop - 1].copy(),
                 positions.source[piece.stop - 1].copy(),
@@ -132,7 +148,13 @@ class Trace:
 
 
 def _scan(
-    axis_words: AxisWords, piece: slice, here: Floats, origin: Ints, first: int, frame: ProgrammedFrame
+    axis_words: AxisWords,
+    piece: slice,
+    here: Floats,
+    origin: Ints,
+    first: int,
+    frame: ProgrammedFrame,
+    undecided: Bools,
 ) -> tuple[Floats, Floats, Ints]:
     value, sets, adds = axis_words.value[piece], axis_words.sets[piece], axis_words.adds[piece]
     lost, left = axis_words.unknown[piece], axis_words.unknown_before[piece]
@@ -143,6 +165,8 @@ def _scan(
             left = left | (axis_words.by_length[piece][:, None] & _LINEAR)
     unknown_before = left & ~sets
     gone = lost | unknown_before | (adds & np.isnan(value))
+    if undecided.any():
+        gone |= adds & undecided & ~np.logical_or.accumulate(sets, axis=0)
     anchor = sets | gone
     n = len(value)
     where = np.maximum.accumulate(np.where(anchor, np.arange(n)[:, None], -1), axis=0)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.base.arrays import Floats, Ints, shared
+from postproc.base.arrays import Bools, Floats, Ints, shared
 from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses, rotation_from_abc
 from postproc.base.memory import without_garbage_collection
-from postproc.base.units import DEG, MM
+from postproc.base.units import DEG
 from postproc.languages.core.comments_in_force import CONTRADICTED
 from postproc.languages.dialect import PLAIN, Program, ReadingSettings
 from postproc.languages.gcode import offsets
@@ -53,23 +52,26 @@ from postproc.languages.gcode.drill_cycles import (
     stated_coordinates,
     with_holes,
 )
-from postproc.languages.gcode.execution import FoldedWords, execute
+from postproc.languages.gcode.execution import execute
 from postproc.languages.gcode.external_axes import addresses, external_axes, moves_external, others_move
 from postproc.languages.gcode.feeds import Feeds, blend_tolerances, blends, with_stops
 from postproc.languages.gcode.frame_changes import frame_blocks, frame_change
 from postproc.languages.gcode.integer_words import integer_words
+from postproc.languages.gcode.macro_arguments import without_arguments, without_modal_arguments
 from postproc.languages.gcode.modal import modal
 from postproc.languages.gcode.modal_fill import FilledRows, everywhere
 from postproc.languages.gcode.motions import GcodeMotions
 from postproc.languages.gcode.numbered import WorkOffsets, references, tool_lengths, tools, work_offsets
 from postproc.languages.gcode.orientation_words import OrientationWords
-from postproc.languages.gcode.positions import Positions, Trace
+from postproc.languages.gcode.positions import Positions, Trace, stated_place
+from postproc.languages.gcode.program_passes import OTHERWISE_REPEATED, ProgramPass, differs_when_repeated
 from postproc.languages.gcode.reference_points import reference_angles
 from postproc.languages.gcode.refusals import RefusalCollector
 from postproc.languages.gcode.source_map import STATE, FoldedNumbers, GcodeSourceMap
 from postproc.languages.gcode.stated_kinematics import with_stated_kinematics
-from postproc.languages.gcode.subprogram_files import JoinedText, file_name, join
+from postproc.languages.gcode.subprogram_files import files_read_too, join
 from postproc.languages.gcode.tool_orientation import ToolOrientations
+from postproc.languages.gcode.tool_tilts import tilting
 from postproc.languages.gcode.words import key
 from postproc.toolpath import (
     Arcs,
@@ -79,6 +81,7 @@ from postproc.toolpath import (
     MotionSpeeds,
     OrientationControl,
     ProgramComments,
+    Reflections,
     Targets,
     Toolpath,
 )
@@ -90,16 +93,34 @@ PART = 1 << 14
 @without_garbage_collection()
 def read(documents: tuple[Document, ...], control: Control, settings: ReadingSettings = PLAIN) -> Program:
     """Read a program; never raises on its content."""
+    first = _read(documents, control, settings)
+    if not first.execution.restarts:
+        return first.program
+    elsewhere = differs_when_repeated(first, lambda block: _read(documents, control, settings, block))
+    return (
+        _read(documents, control, settings, elsewhere=elsewhere).program if elsewhere.any() else first.program
+    )
+
+
+def _read(
+    documents: tuple[Document, ...],
+    control: Control,
+    settings: ReadingSettings,
+    again: int | None = None,
+    elsewhere: Bools | None = None,
+) -> ProgramPass:
+    """A program read; again: as of ``execute``; elsewhere (N,): motions that are others when M99 has led back."""
     document = documents[0]
     joined = join(document.raw, settings.siblings, control)
-    text = joined.source
+    text = without_modal_arguments(joined.source, control)
     integers = integer_words(text, control, settings.options.get(INTEGER_WORDS, ""))
     own = joined.blocks if joined.files else None
-    execution = execute(text, control, settings.symbols, own, integers)
+    execution = execute(text, control, settings.symbols, own, integers, again)
     if joined.files and not execution.followed:
-        return read(documents, control, replace(settings, siblings=()))
+        return _read(documents, control, replace(settings, siblings=()), again, elsewhere)
     offsets_in_text = execution.source.blocks.start
     source, foreign = joined.at_the_calls(execution.source)
+    source = without_arguments(source, control)
     execution = replace(execution, source=source)
     in_force = modal(execution, control, settings.initial.base)
     in_force = with_stated_kinematics(source, in_force, settings.options.get(ROTARY_WORDS, ""))
@@ -118,14 +139,16 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
             message = f"the motion is in {file.path.name}, which is read and not written"
             collector.refuse(joined.of_file(file, offsets_in_text[rows]), "GCO033", message)
         collector.refuse(computed, "GCO005", "a G or M code of the block is computed")
+        if elsewhere is not None:
+            collector.refuse(elsewhere, "GCO006", OTHERWISE_REPEATED)
         return _followed(words, rows, offset, base, tool, settings, unbound, collector)
 
     run, coordinates = followed(given), False
     if run.differing_radii and control.iso and given.modal.ahead[Group.ARCS] == 0:
         # Centres that no code says to be differences may be coordinates: where all arcs are some only so.
         other = given.with_absolute_centres()
-        if other is not None and not (again := followed(other)).differing_radii:
-            given, run, coordinates = other, again, True
+        if other is not None and not (absolute := followed(other)).differing_radii:
+            given, run, coordinates = other, absolute, True
     found, built, frames, orientations, collector = (
         run.columns,
         run.built,
@@ -189,12 +212,16 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         arcs=Arcs(*(found.take_column(name) for name in ("centre", "normal", "sweep", "plane_free"))),
         orientation_control=OrientationControl(
             path=found.take_column("orientation_path"),
-            **{name: found.take_column(name) for name in ("rotary_from", "rotary_to", "redundant_axis")},
+            **{
+                name: found.take_column(name)
+                for name in ("rotary_from", "rotary_to", "redundant_axis", "part_turn", "in_machine")
+            },
         ),
         remarks=ProgramComments(said.annotations, said.comments),
+        reflections=Reflections.of_frames(run.reflections, state["frame"]),
     )
     findings = [
-        *_read_too(document, joined, execution.missing),
+        *files_read_too(document, joined, execution.missing),
         *refused.findings(),
         *diagnostics(document, given, rows, tool, named, settings),
     ]
@@ -208,7 +235,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         findings += [
             Finding("GCO031", message, str(document.path), int(line[row]), 1) for row in arc.tolist()
         ]
-    return Program(
+    program = Program(
         control.name,
         documents,
         path,
@@ -220,7 +247,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
             stop=lines.stop[rows],
             frames=frames,
             orientations=orientations,
-            folded=_folded(execution.folded, rows),
+            folded=FoldedNumbers.of(execution.folded, rows),
         ),
         tuple(sorted(findings, key=lambda finding: finding.line)),
         said.marker,
@@ -228,43 +255,21 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         (),
         execution.missing,
     )
-
-
-def _read_too(document: Document, joined: JoinedText, missing: frozenset[str]) -> list[Finding]:
-    """Which files beside the program are read, and hold what it calls."""
-    names = [(file, file_name(file.path)) for file in joined.files]
-    return [
-        Finding("GCO032", f"{file.path} is read for the call of {name}", str(document.path))
-        for file, name in names
-        if name not in missing
-    ]
-
-
-def _start(settings: ReadingSettings) -> Floats:
-    """(6,) [m, rad] where the axes are at the first block, NaN where that is not stated."""
-    words = settings.initial.words
-    stated = np.array([words.get(axis, math.nan) for axis in "XYZABC"])
-    return np.asarray(stated * np.repeat([MM, DEG], 3))
-
-
-def _folded(words: FoldedWords, rows: Ints) -> FoldedNumbers:
-    """The words with values of expressions in the motions, which are the blocks ``rows`` (N,)."""
-    at = np.searchsorted(rows, words.step)
-    mine = np.append(rows, -1)[at] == words.step
-    order = np.argsort(at[mine], kind="stable")
-    return FoldedNumbers(*(column[mine][order] for column in (at, words.key, words.value)))
+    return ProgramPass(program, execution, rows)
 
 
 class FollowedMotions(NamedTuple):
     """The motions' columns, what others build on, the frames of the program, what its orientation words mean, and why
     motions are refused; differing_radii: arcs whose radii at start and end differ; levels (K,): blocks that state the
-    level to which a drill cycle goes back; along_plane: the first block that brings the tool along a plane, -1."""
+    level to which a drill cycle goes back; along_plane: the first block that brings the tool along a plane, -1;
+    reflections (F, 3, 3): of the frames."""
 
     columns: FilledRows
     built: Built
     frames: Poses
     orientations: tuple[OrientationWords, ...]
     collector: RefusalCollector
+    reflections: Floats
     differing_radii: int
     levels: Ints
     along_plane: int
@@ -283,11 +288,12 @@ def _followed(
     """The motions in the blocks ``rows`` (N,), part by part; base (N,), tool (B,): numbers."""
     turned = None if settings.orientation is None else rotation_from_abc(settings.orientation)
     events = frame_blocks(words)
-    trace = Trace(offsets.start(), events, frame_change(words, events), _start(settings))
+    at_start, by_setting = stated_place(settings.initial.words), words.control.increments_by_setting
+    trace = Trace(offsets.start(), events, frame_change(words, events), at_start, by_setting)
     feeds, tool_orientations, away, reasons = (
         Feeds(words),
         ToolOrientations(words, turned, settings.options.get(ROTARY_WORDS) == TURN_PART),
-        tilted(words),
+        tilted(words, tilting(words)),
         Reasons(len(words)),
     )
     allowed = blend_tolerances(words)
@@ -319,7 +325,7 @@ def _followed(
         check_correctability(here, moves, where, base[low:high], tool[rows[low:high]], reasons, unbound, part)
         found.put(
             high - low,
-            **_columns(here, where, moves, feeds, tool_orientations.turn_part),
+            **_columns(here, where, moves, feeds, tool_orientations.turning_part),
             blend=np.where(np.isfinite(moves.room), 0.0, blends(here, own, allowed)),
             sets=stated_coordinates(ends.stated(way.sets[own, :3], rows[low:high]), moves, holes),
             lost=way.unknown[own, :3],
@@ -337,6 +343,7 @@ def _followed(
         frames,
         tuple(tool_orientations.orientations),
         collector,
+        np.array([frame.reflection for frame in trace.frames]),
         differing,
         levels,
         int(trace.started(np.array(along[:1], np.int64))[0]) if along else -1,
@@ -344,9 +351,9 @@ def _followed(
 
 
 def _columns(
-    words: BlockWords, where: Positions, moves: GcodeMotions, feeds: Feeds, turn_part: bool
+    words: BlockWords, where: Positions, moves: GcodeMotions, feeds: Feeds, turning_part: Bools
 ) -> dict[str, NDArray[Any]]:
-    """What is kept of the motions of a part; turn_part: as of ``ToolOrientations``."""
+    """What is kept of the motions of a part; turning_part (3,): as of ``ToolOrientations``."""
     rows, force, stand = moves.block, words.modal.force, moves.tool_orientation
     place = moves.place.copy()
     # beside the contour, by the tool's radius: that is also where the motion after G40 starts
@@ -354,7 +361,10 @@ def _columns(
     place[(words.modal.flow.reason[rows] != 0) | beside | np.isnan(place).any(axis=1)] = np.nan
     placed = ~np.isnan(place[:, :1])
     feed = feeds.of(rows + words.start, moves.length)
-    if turn_part:
+    part_turn = everywhere(np.full(3, np.nan), len(rows))
+    if turning_part.any():
+        at_tip = force[Group.TCP][rows] == 1
+        part_turn = np.where(at_tip[:, None], np.nan, np.where(turning_part, moves.end[:, 3:] * DEG, 0.0))
         # without a TCP mode F is also that of the axes that turn the part
         turning = words.has(*AXES[3:])[rows] & (force[Group.TCP][rows] != 1)
         turning &= force[Group.FEED][rows] != Feed.INVERSE_TIME
@@ -372,9 +382,11 @@ def _columns(
         # controls accept no rotary words in a drill cycle
         "orientation_programmed": stand.writable & np.isnan(moves.room),
         "redundant_axis": stand.redundant_axis,
+        "in_machine": stand.in_machine,
         "orientation_path": stand.path,
         "rotary_from": rotary_from,
         "rotary_to": rotary_to,
+        "part_turn": part_turn,
         "plane_free": given_by_point(words, rows),
         "turned": stand.stated | (stand.orient < 0),
         "move": moves.move,

@@ -33,6 +33,12 @@ LEFT = RefusalReason(
     "plane",
     "write the words of the rotary axes after the plane (G0 A0 C0)",
 )
+TILTED = RefusalReason(
+    "GCO013",
+    "the tool keeps the last direction of the TCP mode, and no rotary axis states where it is",
+    "tilted",
+    "state a direction along Z before the mode ends (A3=0 B3=0 C3=1), or write the words of the rotary axes after it",
+)
 UNKNOWN = RefusalReason("GCO013", "what states the orientation of the tool is not known", "unknown")
 
 
@@ -54,13 +60,13 @@ def refuse_rotary(
     lost = np.isnan(moves.end[some, 3:]) & used
     tcp = words.modal.force[Group.TCP][rows] == 1
     causes = np.where(lost, where.source[rows, 3:], _KNOWN)
-    state = np.stack([tcp, ~tcp & _away(moves, some, used), wrong[some] == 3], axis=1)
+    state = np.stack([tcp, ~tcp & _away(moves, some, used), wrong[some] == 3, wrong[some] == 4], axis=1)
     kinds, which = np.unique(np.concatenate([causes, state], axis=1), axis=0, return_inverse=True)
     messages = []
     away = BY_CODE if (words.source.column(key("M")).value == TIP_ON_M).any() else AWAY
-    for *lost_at, in_tcp, is_away, left in kinds.tolist():
-        if left:
-            messages.append(LEFT)
+    for *lost_at, in_tcp, is_away, left, tilted in kinds.tolist():
+        if left or tilted:
+            messages.append(LEFT if left else TILTED)
         elif max(lost_at) > _KNOWN:
             messages.append(_lost(words, reasons, lost_at, bool(in_tcp)))
         else:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+import re
 from bisect import bisect_left
+from collections import Counter
 
 import numpy as np
 
 from postproc.base.arrays import Bools
+from postproc.languages.gcode.execution_flow import NEVER, UNCLEAR
 from postproc.languages.gcode.run_labels import called_name
 from postproc.languages.gcode.run_state import CallFrame, RunState
-from postproc.languages.gcode.statements import FlowStatement, NotFollowed
+from postproc.languages.gcode.statements import FlowStatement, NotFollowed, separated
 from postproc.languages.gcode.words import How, key
 
 DEEPEST_CALL = 20
@@ -18,6 +21,12 @@ PACKED = 10_000
 """M98 P031234 calls O1234 three times."""
 _ARGUMENTS = dict(zip("ABCIJKDEFHMQRSTUVWXYZ", (*range(1, 10), 11, 13, *range(17, 27)), strict=True))
 """Letters of G65 -> the numbers of their variables."""
+PROCEDURE = re.compile(r"PROC[ \t]++\w++[ \t]*+\(([^()]*+)\)", re.I)
+"""The head of a subprogram with parameters."""
+_PARAMETER = re.compile(r"(REAL)[ \t]++(\w++)[ \t]*+(?:=.*)?", re.I)
+"""One whose value is handed over; what a whole number or a truth makes of a value is not looked at."""
+_REPEATED = "IJK"
+"""Letters that may come up to ten times."""
 _COUNTS = "DEFHMST"
 """Letters that are no lengths or angles."""
 
@@ -50,8 +59,24 @@ class RunCalls(RunState):
         self.called.append(step)
         if count < 1:
             return block + 1
-        self.frames.append(CallFrame(block + 1, start, stop, count, block, outer, jumps=verb == "local"))
+        jumps, saves = verb == "local", step if self.restores(start, stop) else NEVER
+        self.frames.append(CallFrame(block + 1, start, stop, count, block, outer, jumps, saves=saves))
         return self.enter_part()
+
+    def restores(self, start: int, stop: int) -> bool:
+        """Whether a subprogram in the blocks ``start`` .. ``stop`` - 1 restores modes at its end."""
+        return bisect_left(self.saving, start) < bisect_left(self.saving, stop)
+
+    def keep_modes(self, verb: str, step: int) -> None:
+        """M70 to M73 at ``step``, UNCLEAR where it may run or not."""
+        around = self.frames[-1] if self.frames else self
+        if verb == "restore":
+            if step != UNCLEAR:
+                self.saved.append((UNCLEAR if around.kept == NEVER else around.kept, self.count))
+            return
+        around.kept = UNCLEAR if verb == "invalidate" else step
+        if verb == "save for the call" and self.frames:
+            self.frames[-1].saves = step
 
     def enter_part(self) -> int:
         """The start of what is called or repeated."""
@@ -96,8 +121,12 @@ class RunCalls(RunState):
             numbered |= {f"#{number}": value for number, value in enumerate(values, 1)}
             return around.start + 1, self.n, 1, numbered
         if statement is not None:
-            part = self.labels.program(statement.label)
-            return None if part is None else (*part, 1, self.variables.own())
+            name, bracket, handed = statement.label.partition("(")
+            part = self.labels.program(name)
+            if part is None or not bracket:
+                return None if part is None else (*part, 1, self.variables.own())
+            parameters = self.parameters(part, handed.rstrip().removesuffix(")"), block)
+            return None if parameters is None else (*part, 1, parameters)
         if verb == "named":
             number, runs = self.word(block, "L"), self.runs(block, "P")
             part = self.labels.program(f"L{number:.0f}") if not math.isnan(number) else None
@@ -116,23 +145,58 @@ class RunCalls(RunState):
         if part is None:
             return None
         if verb == "macro":
-            words = {letter: self.argument(block, letter) for letter in _ARGUMENTS}
-            given = {f"#{_ARGUMENTS[one]}": value for one, value in words.items() if not math.isnan(value)}
-            return (*part, runs, given)
+            return (*part, runs, self.arguments(block))
         return (*part, runs, None)
 
-    def argument(self, block: int, letter: str) -> float:
-        """What a word of G65 states, NaN without; of a length in increments that is not known."""
-        at = self.last_word(block, letter)
+    def parameters(self, part: tuple[int, int], handed: str, block: int) -> dict[str, float] | None:
+        """What a subprogram of a Sinumerik has of its own at its start, by its PROC; None where that does not state
+        parameters whose values are handed over, or states fewer than are ``handed`` over."""
+        heads = [text for text in self.assigned.get(part[0], ()) if PROCEDURE.match(text)]
+        found = PROCEDURE.match(heads[0]) if len(heads) == 1 else None
+        names = (
+            [_PARAMETER.fullmatch(one.strip()) for one in found[1].split(",")] if found is not None else []
+        )
+        texts = separated(handed)
+        if not names or None in names or len(texts) > len(names):
+            return None
+        values = [self.value(text, block) for text in texts]
+        return {one[2].upper(): value for one, value in zip(names, values, strict=False) if one is not None}
+
+    def arguments(self, block: int) -> dict[str, float]:
+        """The variables that the words of G65 set.  I, J and K in this order are #4, #5 and #6; each that comes again
+        starts three further ones; of two words for one variable the later one holds (Fanuc, "argument specification I
+        and II").  What other orders are, the manuals do not state."""
+        given: dict[str, float] = {}
+        counts: Counter[str] = Counter()
+        further, group = 0, ""
+        for letter in "".join(self.letters.get(block, ())):
+            nth = counts[letter]
+            counts[letter] += 1
+            if letter not in _ARGUMENTS:
+                continue
+            if letter in _REPEATED:
+                again = letter in group
+                if not again and group and letter < group[-1]:
+                    return {name: value for name, value in given.items() if int(name[1:]) < _ARGUMENTS["I"]}
+                further, group = (further + 1, letter) if again else (further, group + letter)
+            number = _ARGUMENTS[letter] + (len(_REPEATED) * further if letter in _REPEATED else 0)
+            twice = nth > 0 and letter not in _REPEATED
+            given[f"#{number}"] = math.nan if twice else self.argument(block, letter, nth)
+        return {name: value for name, value in given.items() if not math.isnan(value)} if further < 10 else {}
+
+    def argument(self, block: int, letter: str, nth: int) -> float:
+        """What the ``nth`` word of a letter of G65 states; NaN of a length in increments that is not known."""
+        column = self.source.column(key(letter))
+        at = int(bisect_left(column.block, block)) + nth
         counts = self.integer_words.increments or self.integer_words.ambiguous
-        if (
-            counts
-            and letter not in _COUNTS
-            and at >= 0
-            and self.source.column(key(letter)).how[at] == How.INTEGER
-        ):
+        if counts and letter not in _COUNTS and column.how[at] == How.INTEGER:
             return math.nan
-        return self.word(block, letter)
+        for step, address, place, value, _ in reversed(self.rows):
+            if step != self.count - 1:
+                break
+            if (address, place) == (key(letter), nth):
+                return value
+        return float(column.value[at])
 
     def runs(self, block: int, letter: str) -> int | None:
         """How often a call runs, by the word of this letter; None where that is not known."""
@@ -157,6 +221,8 @@ class RunCalls(RunState):
     def leave(self) -> int:
         """From the end of what is repeated or called."""
         frame = self.frames[-1]
+        if frame.saves != NEVER:
+            self.saved.append((frame.saves, self.count))
         frame.count -= 1
         if frame.count > 0:
             return self.enter_part()
@@ -171,6 +237,7 @@ class RunCalls(RunState):
         start = self.labels.find(statement, block)
         count = self.value(statement.text, block)
         if start is None or math.isnan(count) or count != math.floor(count):
+            self.lacks_count = math.isnan(count)
             raise NotFollowed
         self.emit(block, block + 1)
         if statement.direction == "B":
@@ -186,9 +253,21 @@ class RunCalls(RunState):
             if count < 1:
                 return block + 1
             raise NotFollowed
+        if stop != block and statement.direction != "B" and self.says_more_than_a_label(stop):
+            raise NotFollowed  # whether the block of the last label is repeated too is not certain
         through = statement.direction != "B"
         self.frames.append(CallFrame(block + 1, start, stop, int(count), block, None, True, through))
         return self.enter_part()
+
+    def says_more_than_a_label(self, block: int) -> bool:
+        """Whether a block has words, but its number, or says anything besides its label."""
+        if block not in self.only_labels:
+            noted = any(note.block == block and note.kind != "label" for note in self.source.notes)
+            columns = (column for address, column in self.source.columns.items() if address != key("N"))
+            self.only_labels[block] = not noted and not any(
+                (column.block == block).any() for column in columns
+            )
+        return not self.only_labels[block]
 
     def hide(self, block: int) -> None:
         """Has the program followed again, with what a block opens or calls as what may run or not.  Raises RunAgain."""

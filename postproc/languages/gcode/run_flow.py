@@ -6,8 +6,9 @@ import math
 from bisect import bisect_left
 from itertools import pairwise
 
-from postproc.languages.gcode.execution_flow import ONE_ARM_RUNS, STRAIGHT
+from postproc.languages.gcode.execution_flow import ONE_ARM_RUNS, STRAIGHT, UNCLEAR
 from postproc.languages.gcode.run_calls import RunCalls
+from postproc.languages.gcode.run_state import MODE_VERBS
 from postproc.languages.gcode.statements import Construct, FlowStatement, NotFollowed, Verb
 
 
@@ -72,10 +73,15 @@ class RunFlow(RunCalls):
         verb = self.codes.get(block)
         if verb == "end":
             return self.leave() if self.frames and self.control.calls else None
-        if verb == "return":
-            if self.frames and self.last_word(block, "P") >= 0:
+        if verb == "return" and self.frames:
+            if self.last_word(block, "P") >= 0:
                 raise NotFollowed
-            return self.leave() if self.frames else None
+            return self.leave()
+        if verb == "return":
+            return self.main_return(block)
+        if verb and verb in MODE_VERBS.values():
+            self.keep_modes(verb, step)
+            return block + 1
         if verb is not None:
             return self.call(block, verb, step)
         return block + 1
@@ -90,9 +96,15 @@ class RunFlow(RunCalls):
                 raise NotFollowed
         if verb == "return" and self.frames:
             self.hide(self.frames[-1].call)
+        if verb == "return" and (target := self.returned_to(block)) > block:
+            return self.branch_away(FlowStatement(block, Verb.GOTO), target)
         self.fold(block, self.count)
         self.emit(block, block + 1)
         self.assign(block, certain=False)
+        if verb and verb in MODE_VERBS.values():
+            self.keep_modes(verb, UNCLEAR)
+        if verb == "return":
+            return self.may_start_again([block], block + 1)
         if statement is not None or verb in ("call", "local", "macro", "named"):
             self.perhaps_call(block, verb or "", statement)
             self.variables.forget()
@@ -214,7 +226,7 @@ class RunFlow(RunCalls):
         one_runs = around.verb == Verb.IF and len(arms) > 1 and not around.arms[-1][1]
         self.passed_or_not([*arms, around.stop], one_runs)
         self.perhaps_range(around.start, around.stop + 1)
-        return around.stop + 1
+        return self.may_start_again(self.main_returns(around.start, around.stop + 1), around.stop + 1)
 
     def passed_or_not(self, bounds: list[int], one_runs: bool) -> None:
         """Notes what is between blocks, the first of which is the next to run, as parts of which one runs or none."""
@@ -229,9 +241,11 @@ class RunFlow(RunCalls):
         low, high = bisect_left(self.special, start), bisect_left(self.special, stop)
         for block in self.special[low:high]:
             self.fold(block, self.count + block - start)
-            statement = self.shape.statements.get(block)
-            if statement is None or statement.verb == Verb.CALL:
-                self.perhaps_call(block, self.codes.get(block, ""), statement)
+            statement, verb = self.shape.statements.get(block), self.codes.get(block, "")
+            if verb and verb in MODE_VERBS.values():
+                self.keep_modes(verb, UNCLEAR)
+            elif statement is None or statement.verb == Verb.CALL:
+                self.perhaps_call(block, verb, statement)
         self.emit(start, stop, uncertain=True)
 
     def escape(self, start: int, stop: int) -> None:
@@ -241,6 +255,8 @@ class RunFlow(RunCalls):
             statement = self.shape.statements.get(block)
             if self.codes.get(block) == "return" and self.frames:
                 self.hide(self.frames[-1].call)
+            if self.codes.get(block) == "return" and self.returned_to(block) > stop:
+                raise NotFollowed
             if self.codes.get(block) == "end" and self.frames and self.control.calls:
                 self.hide(self.frames[-1].call)
             if statement is None:
@@ -283,10 +299,11 @@ class RunFlow(RunCalls):
             statement.block, statement.verb, f"{number:.0f}", statement.text, statement.direction
         )
 
-    def branch_away(self, statement: FlowStatement) -> int:
-        """A jump that happens only sometimes: what it passes may run or not.  Raises NotFollowed."""
+    def branch_away(self, statement: FlowStatement, target: int | None = None) -> int:
+        """A jump that happens only sometimes, to its label or to ``target``: what it passes may run or not.  Raises
+        NotFollowed."""
         start = statement.block
-        stop = self.labels.find(statement, start)
+        stop = self.labels.find(statement, start) if target is None else target
         if stop is None or stop <= start or self.frames:
             raise NotFollowed
         at = start + 1
@@ -308,6 +325,8 @@ class RunFlow(RunCalls):
                 stop = max(stop, target)
             if inner is not None and inner.verb == Verb.REPEAT_PART:
                 raise NotFollowed
+            if self.codes.get(block) == "return":
+                stop = max(stop, self.returned_to(block))
             at = block + 1
         if self.labels.between(start, stop):
             raise NotFollowed
@@ -316,4 +335,50 @@ class RunFlow(RunCalls):
         self.emit(start, start + 1)
         self.perhaps_range(start + 1, stop)
         self.entered.append(self.count)
-        return stop
+        return self.may_start_again(self.main_returns(start + 1, stop), stop)
+
+    def main_return(self, block: int) -> int | None:
+        """M99 of the main program: a jump to the block of its P, or back to the start.  Raises NotFollowed."""
+        target = self.returned_to(block)
+        if target <= block:
+            return target if self.starts_again(block, target) else None
+        self.entered.append(self.count)
+        self.jumped.append(self.count)
+        return target
+
+    def returned_to(self, block: int) -> int:
+        """Where M99 of the main program leads to.  Raises NotFollowed."""
+        if self.last_word(block, "P") < 0:
+            return self.labels.part_of(block)[0]
+        number = self.word(block, "P")
+        if math.isnan(number) or number != math.floor(number):
+            raise NotFollowed
+        target = self.labels.number(int(number), block)
+        if target is None:
+            raise NotFollowed
+        return target
+
+    def main_returns(self, start: int, stop: int) -> list[int]:
+        """The blocks ``start`` .. ``stop`` - 1 with a M99 of the main program."""
+        low, high = bisect_left(self.special, start), bisect_left(self.special, stop)
+        codes = ((block, self.codes.get(block)) for block in self.special[low:high])
+        return [block for block, code in codes if code == "return" and not self.frames]
+
+    def may_start_again(self, blocks: list[int], following: int) -> int:
+        """Where the run goes on after ``blocks`` that may lead back: to ``following``, or to where it starts again."""
+        for block in blocks:
+            target = self.returned_to(block)
+            if target <= block and self.starts_again(block, target):
+                return target
+        return following
+
+    def starts_again(self, block: int, target: int) -> bool:
+        """Whether the run goes through the blocks from ``target`` to this one once more; it does so for one M99."""
+        self.restarts.append(block)
+        if self.again != block or self.second_pass >= 0:
+            return False
+        self.kill(target, self.n)  # from pass to pass
+        self.second_pass = self.count
+        self.entered.append(self.count)
+        self.jumped.append(self.count)
+        return True

@@ -3,20 +3,32 @@
 from __future__ import annotations
 
 import math
+import re
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.languages.gcode.control import Control
-from postproc.languages.gcode.execution_flow import LOCAL, RETURNS, tape_blocks
+from postproc.languages.gcode.execution_flow import (
+    INVALIDATES,
+    LOCAL,
+    NEVER,
+    RESTORES,
+    RETURNS,
+    SAVES,
+    SAVES_FOR_A_CALL,
+    macro_modes,
+    tape_blocks,
+)
 from postproc.languages.gcode.integer_words import IntegerWords
 from postproc.languages.gcode.lexing import FARTHEST
 from postproc.languages.gcode.run_labels import RunLabels
-from postproc.languages.gcode.source import Source
+from postproc.languages.gcode.source import MACRO, Source
 from postproc.languages.gcode.statements import (
     NotFollowed,
     Structure,
+    VariableAssignment,
     Verb,
     assignments,
     background_names,
@@ -29,11 +41,22 @@ SUBPROGRAM = 98
 STEPS, BLOCKS = 50_000, 200_000
 """How many statements, and blocks, are followed beyond four times those of the program."""
 
+MODE_VERBS = {
+    SAVES: "save", INVALIDATES: "invalidate", RESTORES: "restore", SAVES_FOR_A_CALL: "save for the call",
+}  # fmt: skip
+"""M of a LinuxCNC -> what they do with the modes in force."""
+SAVING = re.compile(r"PROC\b.*\bSAVE\b", re.I)
+"""The head of a subprogram of a Sinumerik whose end restores the modal G functions and the frame of its caller."""
+
+_NO_CALLS = frozenset(["end", "return", *MODE_VERBS.values()])
+
 
 @dataclass
 class CallFrame:
     """Where a call goes back to, what is repeated and until where; locals: the variables of the caller; jumps: it
-    starts at a label, past what is before that; through: its end is a label, which is reached from before."""
+    starts at a label, past what is before that; through: its end is a label, which is reached from before; saves: the
+    step at which the modes were in force that the end of a subprogram restores; kept: the step of its last M70 or
+    M73; both may be NEVER or UNCLEAR."""
 
     back: int
     start: int
@@ -43,10 +66,13 @@ class CallFrame:
     locals: dict[str, float] | None
     jumps: bool = False
     through: bool = False
+    saves: int = NEVER
+    kept: int = NEVER
 
 
 class RunState:
-    """One attempt at following a program; ``opaque``: blocks of constructs and calls that may run or not."""
+    """One attempt at following a program; ``opaque``: blocks of constructs and calls that may run or not; again:
+    block of a M99 of the main program that leads back, from which it runs a second time."""
 
     def __init__(
         self,
@@ -56,18 +82,22 @@ class RunState:
         shape: Structure,
         opaque: set[int],
         integer_words: IntegerWords,
+        again: int | None = None,
     ) -> None:
+        self.again, self.second_pass, self.restarts = again, -1, list[int]()
         self.source, self.control, self.variables = source, control, variables
         self.shape, self.opaque, self.integer_words = shape, opaque, integer_words
         self.n = len(source.blocks)
         self.values = by_block(source.notes, "value")
         self.assigned = by_block(source.notes, "assign")
         self.conditions = by_block(source.notes, "if")
+        self.letters = by_block(source.notes, "arguments")
         self.strange = {
             note.block
             for note in source.notes
             if note.kind == "unknown" and ("=" in note.text or "#" in note.text)
         }
+        self.strange |= set(np.flatnonzero(macro_modes(source) > 0).tolist())
         for texts in self.assigned.values():
             for text in texts:
                 variables.volatile |= background_names(text)
@@ -80,7 +110,7 @@ class RunState:
         self.deleted = set(np.flatnonzero(source.blocks.deleted).tolist())
         self.codes = self._codes()
         self.calling = {note.block for note in source.notes if note.kind == "call"}
-        self.calling |= {block for block, verb in self.codes.items() if verb not in ("end", "return")}
+        self.calling |= {block for block, verb in self.codes.items() if verb not in _NO_CALLS}
         self.tape = tape_blocks(source)
         special = {
             *self.values, *self.assigned, *self.conditions, *self.strange, *shape.statements, *self.codes,
@@ -98,9 +128,16 @@ class RunState:
         # steps before which the run comes to a block that is none of it
         self.reached: list[tuple[int, int]] = []
         self.unknown: dict[str, int] = {}
+        self.lacks_count = (
+            False  # the program cannot be followed as it is not known how often a part is repeated
+        )
         self.integers: set[str] = set()  # names that hold whole numbers only
         self.frames: list[CallFrame] = []
         self.repeats: dict[int, int] = {}
+        self.kept = NEVER  # of the main program: as of ``CallFrame``
+        self.saved: list[tuple[int, int]] = []  # as of ``Execution.saved``
+        self.saving = sorted(block for block, texts in self.assigned.items() if any(map(SAVING.match, texts)))
+        self.only_labels: dict[int, bool] = {}  # blocks at which a part that is repeated ends
         self.steps = 0
         self.missing: set[str] = set()  # names of what is called and not here
         left = {
@@ -115,12 +152,14 @@ class RunState:
         """Block -> what its M, G65 or L words do to the flow."""
         found: dict[int, str] = {}
         m, g = self.source.column(key("M")), self.source.column(key("G"))
+        for code, verb in MODE_VERBS.items() if self.control.saves_modes else ():
+            found.update(dict.fromkeys(m.block[m.value == code].tolist(), verb))
         for code, verb in (
             *((code, "end") for code in self.control.endings), *((code, "return") for code in RETURNS),
             (SUBPROGRAM, "call"), (LOCAL, "local"),
         ):  # fmt: skip
             found.update(dict.fromkeys(m.block[m.value == code].tolist(), verb))
-        found.update(dict.fromkeys(g.block[g.value == 65].tolist(), "macro"))
+        found.update(dict.fromkeys(g.block[g.value == MACRO].tolist(), "macro"))
         if self.control.calls:
             calls = self.source.mask(*self.control.calls)
             found.update(dict.fromkeys(np.flatnonzero(calls).tolist(), "named"))
@@ -154,7 +193,8 @@ class RunState:
     def value(self, text: str, block: int, without: set[str] | None = None) -> float:
         value, missing = self.variables.evaluate(text, without or set())
         for name in missing:
-            self.unknown.setdefault(name, block)
+            if self.variables.can_be_bound(name):
+                self.unknown.setdefault(name, block)
         return value
 
     def targets(self, block: int) -> set[str]:
@@ -169,14 +209,23 @@ class RunState:
         if texts is None:
             return
         every = [one for text in texts for one in assignments(text)]
-        own = set() if self.variables.parallel or len(every) < 2 else self.targets(block)
+        alone = self.variables.parallel or self.variables.in_turn or len(every) < 2
+        own = set() if alone else self.targets(block)
+        if self.variables.in_turn:
+            for one in every:
+                self.put(one, self.value(one.text, block, own) if certain else math.nan)
+            return
         values = [self.value(one.text, block, own) if certain else math.nan for one in every]
         for one, value in zip(every, values, strict=True):
-            name = self.variables.name(one.target)
-            if one.integer:
-                self.integers.add(name)
-            fine = name not in self.integers or math.isnan(value) or value == math.floor(value)
-            self.variables.set(name, value if fine else math.nan)
+            self.put(one, value)
+
+    def put(self, one: VariableAssignment, value: float) -> None:
+        """An assignment of a value."""
+        name = self.variables.name(one.target)
+        if one.integer:
+            self.integers.add(name)
+        fine = name not in self.integers or math.isnan(value) or value == math.floor(value)
+        self.variables.set(name, value if fine else math.nan)
 
     def kill(self, start: int, stop: int) -> None:
         """What the blocks ``start`` .. ``stop`` - 1 may assign is unknown."""

@@ -12,6 +12,7 @@ from postproc.base.geometry import rotation_from_abc, rotation_from_vector
 from postproc.base.units import DEG
 from postproc.languages.gcode import expression_values
 from postproc.languages.gcode.control import (
+    UNKNOWN,
     Control,
     Event,
     Feed,
@@ -52,7 +53,8 @@ _NUMBERED: tuple[tuple[Group, int, tuple[float, ...]], ...] = (
     (Group.FOREIGN, 1, (291,)),  # blocks of another control until G290
     (Group.FEED, Feed.INVERSE_TIME, (93,)),
     (Group.FEED, Feed.PER_MINUTE, (94, 961, 971)),
-    (Group.FEED, Feed.PER_TURN, (95, 96, 97, 962, 972, 973)),
+    (Group.FEED, Feed.PER_TURN, (95, 96, 97, 973)),
+    (Group.FEED, UNKNOWN, (962, 972)),  # the one in force before, or another
     (Group.OFFSET, 0, (500,)),
     *((Group.OFFSET, n, (53 + n,)) for n in range(1, 5)),
     *((Group.OFFSET, n, (500 + n,)) for n in range(5, 100)),
@@ -136,10 +138,13 @@ _NAMED: tuple[tuple[Group, int, str], ...] = (
         "FNORM FLIN FCUB FPO BRISK SOFT DRIVE FFWON FFWOF COMPON COMPCURV COMPCAD COMPSURF COMPOF FIFOCTRL STARTFIFO "
         "STOPFIFO DYNNORM DYNPOS DYNROUGH DYNSEMIFIN DYNFINISH DYNPREC CUT2D CUT2DF CUT3DC CUT3DF CUT3DFS CUT3DFF CDON "
         "CDOF CDOF2 NORM KONT KONTT KONTC SPCON SPCOF CFC CFTCP CFIN SPATH UPATH LFTXT LFWP LFPOS STOPRE RTLION RTLIOF "
-        "SBLON SBLOF ORISON ORISOF ORIWKS ORIMKS ORIAXES ORIVECT ORIPLANE ORIMACHAX ORIVIRTAX ORIVIRT1 "
+        "SBLON SBLOF ORISON ORISOF ORIAXES ORIVECT ORIPLANE ORIMACHAX ORIVIRTAX "
         "ADISPOSA DISPLOF DISPLON TCOABS TCOFR TCOFRX TCOFRY TCOFRZ NOC FEEDOF BNAT BTAN BAUTO ENAT ETAN EAUTO "
         "ORIROTA ORIROTR ORIROTT ORIROTC OSC OSD OSSE OST OSOF GFRAME0 PTPON LIFTFAST ACCLIMA SPIF1 SPIF2",
     ),
+    (Group.EULER, -1, "ORIVIRT1 ORIVIRT2"),  # virtual axes as machine data define them
+    (Group.ORIENTED, 0, "ORIWKS"),
+    (Group.ORIENTED, 1, "ORIMKS"),
 )
 
 
@@ -156,6 +161,7 @@ _ALONG_TOOL = {
 } | {NAMED[b"TOROTZ"][0], NAMED[b"PAROT"][0]}
 """What turns the coordinates along the tool or the part, and stays when a programmable frame takes another's place."""
 _ALONG_TOOL_ENDS = {NAMED[b"TOROTOF"][0], NAMED[b"PAROTOF"][0]}
+_FRAME_CODE = ModalCode(Group.ONCE, Once.FRAME)
 _AXES = tuple(key(letter) for letter in "XYZABC")
 _NORMAL = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 
@@ -172,7 +178,8 @@ def frame(event: Event) -> ProgrammedFrame:
     if event.frame.memory == _ORIENTED and _ALONG_TOOL_ENDS.intersection(event.codes):
         return replace(unknown, memory=None)
     said = [_FRAMES[code] for code in event.codes if code in _FRAMES]
-    if len(said) != 1:
+    changes = [code for code in event.codes if CODES.get(round(code * 10)) == _FRAME_CODE]
+    if len(said) != 1 or len(changes) != 1:
         return unknown
     name = said[0]
     if name == "CYCLE800":
@@ -189,13 +196,13 @@ def frame(event: Event) -> ProgrammedFrame:
         shift = given * np.array([event.scale] * 3 + [DEG] * 3)
         return replace(base, shift=base.shift + np.concatenate([base.turn @ shift[:3], shift[3:]]))
     if name.endswith(("SCALE", "MIRROR")):
-        factors = np.array([event.words.get(axis, 1.0) for axis in _AXES[:3]])
-        if name.endswith("MIRROR"):
-            factors = np.array([-1.0 if axis in event.words else 1.0 for axis in _AXES[:3]])
-        elif not (np.isfinite(factors) & (factors > 0)).all():
+        if {*_AXES[3:], RPL} & set(event.words):
             return unknown
-        strange = {*_AXES[3:], RPL} & set(event.words)
-        return unknown if strange else replace(base, turn=base.turn @ np.diag(factors))
+        if name.endswith("MIRROR"):
+            return base.mirrored(np.array([-1.0 if axis in event.words else 1.0 for axis in _AXES[:3]]))
+        factors = np.array([event.words.get(axis, 1.0) for axis in _AXES[:3]])
+        known = (np.isfinite(factors) & (factors > 0)).all()
+        return replace(base, turn=base.turn @ np.diag(factors)) if known else unknown
     if not base.rigid or not name.endswith("ROT"):
         return unknown
     angle = event.words.get(RPL)
@@ -242,6 +249,9 @@ CONTROL = Control(
     also={
         **dict.fromkeys((700, 710, 7100), (ModalCode(Group.FEED_UNITS, 0),)),
         7000: (ModalCode(Group.FEED_UNITS, 1),),
+        # S is a cutting speed until another code of their group
+        **dict.fromkeys((960, 9610, 9620), (ModalCode(Group.SPINDLE, 1),)),
+        **dict.fromkeys((930, 940, 950, 970, 9710, 9720, 9730), (ModalCode(Group.SPINDLE, 0),)),
     },
     feed_units=Group.FEED_UNITS,
     start={Group.OFFSET: 0},
@@ -259,6 +269,8 @@ CONTROL = Control(
     further=True,
     offsets=key("D"),
     expressions=expression_values.SINUMERIK,
+    increments_by_setting=True,  # SD42440 $SC_FRAME_OFFSET_INCR_PROG
+    longest_line=512,  # programming manual "fundamentals", block length
 )
 """Sinumerik 840D, its own language (G290)."""
 

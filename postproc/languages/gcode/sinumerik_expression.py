@@ -50,6 +50,8 @@ def expression_end(text: bytes, at: int) -> int:
             if found is None:
                 return place
             place, joined = found.end(), False
+        elif (operator := _OPERATOR.match(text, place)) is not None:  # MOD, DIV, AND ..
+            place, joined = operator.end(), True
         else:
             return place
     return size

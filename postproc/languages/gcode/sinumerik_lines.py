@@ -27,9 +27,11 @@ POLAR = frozenset(b"AP RP AR ANG".split())
 POSITIONS = frozenset(b"POS POSA POSP MOV AX OS FXS".split())
 """``POS[X]=``: an axis moves by itself, by a computed name, to and fro, or up to a stop."""
 
+CUT: Mapping[bytes, int] = {b"FZ": key("F"), b"SVC": key("S")}
+"""Addresses that take the place of F and S."""
 SETTINGS = frozenset(
-    b"ADIS ADISPOS CTOL OTOL ATOL FGREF FL FA FD FZ FRC FRCM ACC OVRA OVRRAP ACCLIMA JERKLIMA VELOLIMA STAT TU "
-    b"TOFFR SF SD SR SRA STA SVC FP FMA DISC DISR DISCL LIMS MEAC THETA PHI PSI DC FXST FXSW FOC".split()
+    b"ADIS ADISPOS CTOL OTOL ATOL FGREF FL FA FD FRC FRCM ACC OVRA OVRRAP ACCLIMA JERKLIMA VELOLIMA STAT TU "
+    b"TOFFR SF SD SR SRA STA FP FMA DISC DISR DISCL LIMS MEAC PHI PSI DC FXST FXSW FOC".split()
 )
 """Addresses that do not state where a motion goes."""
 
@@ -60,12 +62,14 @@ OPENS = frozenset(b"FOR WHILE LOOP IF".split())
 CLOSES = frozenset(b"ENDFOR ENDWHILE ENDLOOP ENDIF UNTIL".split())
 JUMPS = frozenset(b"GOTO GOTOF GOTOB GOTOC GOTOS REPEAT REPEATB CASE CALL PCALL EXTCALL CALLPATH".split())
 DECLARES = frozenset(b"DEF EXTERN REDEF PROC ID IDS DO WHEN WHENEVER FROM EVERY DEFINE STRING".split())
-SUPERIMPOSED = re.compile(rb"\$AA_T?OFF|\b(?:POS|MOV)\[")
-"""What a synchronous action does to axes while the program's own motions run."""
+SUPERIMPOSED = re.compile(rb"\$AA_T?OFF|\b(?:POS|MOV)\[|\b(?:DELDTG|FTOC|PUTFTOC|PUTFTOCF|CORROF|SYNFCT)\b")
+"""What a synchronous action does to axes while the program's own motions run: it moves, shifts or stops them."""
+OVERRIDDEN = re.compile(rb"\$AC_OVR|\$AC_VC|\$AA_OVR|\$AA_VC|\$A[AC]_PLC_OVR")
 QUIET_NAMES = frozenset(b"ELSE DEFAULT SAVE DISPLOF DISPLON SBLOF SBLON ACTBLOCNO ENDLABEL PREPRO".split())
 
 _HEAD = re.compile(
-    rb"[ \t\x0b\x0c]*(?P<slash>/[ \t]*\d?[ \t]*)?(?:[Nn:][ \t]*\d+[ \t]*)?(?P<slash2>/[ \t]*\d?)?[ \t]*"
+    rb"[ \t\x0b\x0c]*(?P<slash>/[ \t]*\d?[ \t]*)?(?:(?:(?P<letter>[Nn])|:)[ \t]*(?P<number>\d+)[ \t]*)?"
+    rb"(?P<slash2>/[ \t]*\d?)?[ \t]*"
 )
 _LABEL = re.compile(rb"([A-Za-z_][A-Za-z0-9_]+)[ \t]*:(?!=)")
 _NAME = re.compile(rb"[A-Za-z_$][A-Za-z_$][A-Za-z0-9_$]*")
@@ -113,7 +117,13 @@ class _SinumerikLine(LineWords):
         if label is not None:
             self.note("label", label[1].upper())
             place = label.end()
-        return self.lexed(head, place, deleted)
+        found = self.lexed(head, place, deleted)
+        if head is None or not head["letter"]:
+            return found
+        # jumps lead to it, whatever the block says
+        start, stop = head.span("number")
+        number = (head.start("letter"), key("N"), start, stop, float(head["number"]), int(How.INTEGER))
+        return found._replace(words=[number, *found.words])
 
     def codes(self, at: int, stop: int, name: bytes) -> None:
         for number in self.names[name]:
@@ -133,6 +143,13 @@ class _SinumerikLine(LineWords):
                 return expression_end(text, address.end())
             number = key(letter.decode(), int(index) if index else None)
             return self.value(place, number, address.end())
+        index = _INDEX.match(text, place + 1) if text[place : place + 1] in b"Rr" else None
+        if index is not None:
+            assigned = _ASSIGNED.match(text, bracket_end(text, index.end() - 1))
+            if assigned is not None:
+                close = assigned_end(text, assigned.end())
+                self.note("assign", text[place:close].strip())
+                return close
         name = _NAME.match(text, place)
         if name is not None:
             return self.name(name[0].upper(), place, name.end())
@@ -202,10 +219,16 @@ class _SinumerikLine(LineWords):
                 self.codes(place, end, name)
             if name == b"CYCLE800":
                 self.note("swivel", text[end:closed].strip())
+            if name == b"ORIROTC":  # the tool turns about its axis with the path
+                self.note("spin", name)
             return closed
         if name == b"RET":
-            self.word(place, key("M"), -1, end, 17.0, How.INTEGER)
-            return self.arguments(end)
+            closed = self.arguments(end)
+            if self.text[end:closed].strip(b"() \t,"):  # it goes on elsewhere, or returns from several levels
+                self.note("jump", b"GOTOS")
+            else:
+                self.word(place, key("M"), -1, end, 17.0, How.INTEGER)
+            return closed
         return self.statement(name, place, end)
 
     def assigned(self, name: bytes, place: int, after: int) -> int:
@@ -217,6 +240,8 @@ class _SinumerikLine(LineWords):
         if name in ACTIONS:
             # It acts before the motion, as S and M do.
             self.word(place, key("S"), -1, end, math.nan, How.UNREAD)
+        elif name in CUT:  # a feed for each tooth and a cutting speed: how many teeth, the tool's data state
+            self.word(place, CUT[name], -1, end, math.nan, How.UNREAD)
         elif name in SWITCHES:
             off = constant(self.text[after:end]) == (100 if name == b"OVR" else 0)
             self.codes(place, end, SWITCHES[name] + (b"(OFF)" if off else b"(ON)"))
@@ -226,6 +251,8 @@ class _SinumerikLine(LineWords):
             return self.statement(name, place, after)
         elif name in CORNERS or name in POLAR:
             self.note("corner" if name in CORNERS else "polar", name)
+        elif name == b"THETA":
+            self.note("spin", name)
         elif name in SETTINGS:
             pass
         elif name in self.names:  # MEAS=1
@@ -291,7 +318,7 @@ class _SinumerikLine(LineWords):
                 self.note("between" if name == b"ELSE" else "assign", said)
                 if SUPERIMPOSED.search(said):
                     self.codes(place, len(text), b"ROTS")
-                if b"$AC_OVR" in said or b"$AC_VC" in said:
+                if OVERRIDDEN.search(said):
                     self.codes(place, len(text), b"OVR(ON)")
             return len(text)
         closed = self.arguments(end)

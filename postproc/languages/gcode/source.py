@@ -21,6 +21,10 @@ from postproc.languages.gcode.words import Note, Text, key
 
 SIZE = 1 << 18
 """Bytes that are lexed at a time."""
+MACRO = 65
+"""G65 calls as M98, with values for variables."""
+FIRST_INDEXED = 128
+"""Keys from here on are no letters alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +42,10 @@ class WordColumn:
         """Those of the blocks start .. stop - 1, counted from ``start``."""
         low, high = np.searchsorted(self.block, [start, stop]).tolist()
         return WordColumn(self.block[low:high] - start, self.value[low:high], self.how[low:high])
+
+    def where(self, stay: Bools) -> WordColumn:
+        """Those of ``stay`` (W,)."""
+        return WordColumn(self.block[stay], self.value[stay], self.how[stay])
 
     def in_order(self, order: Ints) -> WordColumn:
         """The words of blocks ``order`` (E,), which are the rows of the result."""
@@ -161,10 +169,20 @@ def scan(raw: bytes, control: Control) -> Source:
         notes += (
             [Note(block + blocks, kind, said) for block, kind, said in text.notes] if blocks else text.notes
         )
+        notes += _arguments(text, blocks) if control.iso else ()
         comments.add(text.comments.reshape(-1))
         blocks += len(here)
     columns = {one: WordColumn(*column.done()) for one, column in sorted(words.items())}
     return Source(columns, SourceLines(*lines.done()), tuple(notes), next(comments.done()).reshape(-1, 3))
+
+
+def _arguments(text: Text, before: int) -> Iterator[Note]:
+    """The letters of blocks with a G65 in their order, which says what I, J and K are; ``before``: blocks before."""
+    words = text.words
+    for block in np.unique(words.block[(words.key == key("G")) & (words.value == MACRO)]).tolist():
+        low, high = np.searchsorted(words.block, [block, block + 1]).tolist()
+        letters = "".join(chr(one) for one in words.key[low:high].tolist() if one < FIRST_INDEXED)
+        yield Note(block + before, "arguments", letters)
 
 
 def _pieces(raw: bytes) -> Iterator[tuple[int, int]]:

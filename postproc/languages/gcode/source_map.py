@@ -12,6 +12,7 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.geometry import Poses
 from postproc.languages.gcode.control import Control, Group, Move
+from postproc.languages.gcode.execution import FoldedWords
 from postproc.languages.gcode.lexing import lex
 from postproc.languages.gcode.modal import decode_g_codes
 from postproc.languages.gcode.orientation_words import OrientationWords
@@ -61,6 +62,14 @@ class FoldedNumbers:
     row: Ints
     key: Ints
     value: Floats
+
+    @classmethod
+    def of(cls, words: FoldedWords, rows: Ints) -> FoldedNumbers:
+        """The words of a run with values of expressions, in the motions, which are its steps ``rows`` (N,)."""
+        at = np.searchsorted(rows, words.step)
+        mine = np.append(rows, -1)[at] == words.step
+        order = np.argsort(at[mine], kind="stable")
+        return cls(*(column[mine][order] for column in (at, words.key, words.value)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -208,7 +208,7 @@ def assignments(note: str) -> list[VariableAssignment]:
     text = _BLANKS.sub(" ", note).strip().upper()
     defined = _DEFINITION.fullmatch(text)
     if defined is not None:
-        found = [_DECLARED.fullmatch(part) for part in _parts(defined[2])]
+        found = [_DECLARED.fullmatch(part) for part in separated(defined[2])]
         whole = defined[1] != "REAL"
         return [VariableAssignment(one[1], one[2] or "0", whole) for one in found if one is not None]
     sign = text.find("=", text.find(">") if text.startswith(("#<", "# <")) else 0)
@@ -217,8 +217,8 @@ def assignments(note: str) -> list[VariableAssignment]:
     return [VariableAssignment(text[:sign].strip(), text[sign + 1 :])]
 
 
-def _parts(text: str) -> list[str]:
-    """What commas outside of brackets divide."""
+def separated(text: str) -> list[str]:
+    """The parts of a text between commas outside of brackets."""
     parts, depth, start = [], 0, 0
     for at, letter in enumerate(text):
         depth += (letter in "([") - (letter in ")]")

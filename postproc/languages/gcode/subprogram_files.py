@@ -11,6 +11,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Ints
 from postproc.base.document import Document
+from postproc.base.findings import Finding
 from postproc.base.read_files import note_absent, note_listing
 from postproc.languages.core.sibling_files import document_of, files_in
 from postproc.languages.dialect import Program, ReadingSettings
@@ -122,6 +123,16 @@ def join(raw: bytes, files: Sequence[Document], control: Control) -> JoinedText:
     comments = joined.comments[joined.comments[:, 0] < own]
     shown = Source(joined.columns, joined.blocks, joined.notes, comments)
     return JoinedText(shown, own, tuple(starts), tuple(files))
+
+
+def files_read_too(document: Document, joined: JoinedText, missing: frozenset[str]) -> list[Finding]:
+    """Which files beside the program are read, and hold what it calls."""
+    names = [(file, file_name(file.path)) for file in joined.files]
+    return [
+        Finding("GCO032", f"{file.path} is read for the call of {name}", str(document.path))
+        for file, name in names
+        if name not in missing
+    ]
 
 
 def _as_program(file: Document, control: Control) -> bytes:

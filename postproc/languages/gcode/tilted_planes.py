@@ -100,7 +100,7 @@ def _mirrored(event: Event, mirror: MirrorMemory | None, alone: bool) -> Program
     turned = np.isfinite(centres)
     if not turned.any():
         return replace(before, rotary=None)
-    frame = _moved(before, np.diag(np.where(turned, -1.0, 1.0)), 2.0 * np.nan_to_num(centres))
+    frame = _moved(before, _UNIT, 2.0 * np.nan_to_num(centres)).mirrored(np.where(turned, -1.0, 1.0))
     return replace(frame, memory=MirrorMemory(before, tuple(centres.tolist())))
 
 

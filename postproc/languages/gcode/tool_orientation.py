@@ -21,10 +21,11 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.units import DEG
 from postproc.languages.gcode.blocks import BlockWords
-from postproc.languages.gcode.control import Group, Once, ToolAxis
+from postproc.languages.gcode.control import Group, ToolAxis
 from postproc.languages.gcode.modal_fill import everywhere
 from postproc.languages.gcode.orientation_words import Angles, OrientationWords, Vector, swing
 from postproc.languages.gcode.positions import Positions, Trace
+from postproc.languages.gcode.tool_tilts import ToolTilts, directing
 from postproc.languages.gcode.words import key
 from postproc.toolpath import OrientationPath
 
@@ -32,7 +33,8 @@ WHOLE = 1e-9
 """[rad] a rotary axis this near to 0 is at 0."""
 
 ROTARY, VECTOR, EULER, RPY = range(4)
-_NOWHERE = -1
+_NOWHERE, _UNREAD = -1, -2
+"""Nothing states an orientation; what states it is not read."""
 _ROTARY_KEYS = (key("A"), key("B"), key("C"))
 _SEQUENCES = {EULER: ((2, 0), (0, 1), (2, 2)), RPY: ((2, 2), (1, 1), (0, 0))}
 
@@ -41,9 +43,10 @@ _SEQUENCES = {EULER: ((2, 0), (0, 1), (2, 2)), RPY: ((2, 2), (1, 1), (0, 0))}
 class ToolOrientation:
     """rotation (N, 3, 3); writable (N,): the words can be written; redundant_axis (N, 3): redundant axis; wrong (N,):
     0, or 1 rotary axes away from 0 or not known without a TCP mode, 2 not known in one, 3 the tool is along a plane
-    that is no longer in force.  orient (N,) row in ``ToolOrientations.orientations``, -1 where none is in force;
+    that is no longer in force, 4 it is where a direction that is no longer in force has left it.
+    orient (N,) row in ``ToolOrientations.orientations``, -1 where none is in force;
     values, before (N, 3): as in Places.  stated (N,): the block itself states the whole orientation in force.
-    path (N,) OrientationPath."""
+    path (N,) OrientationPath.  in_machine (N,): the words are in the axes of the machine (ORIMKS)."""
 
     rotation: Floats
     writable: Bools
@@ -54,6 +57,7 @@ class ToolOrientation:
     before: Floats
     stated: Bools
     path: Ints
+    in_machine: Bools
 
     @staticmethod
     def unsaid(count: int, turned: Floats | None) -> ToolOrientation:
@@ -71,6 +75,7 @@ class ToolOrientation:
             nothing,
             no,
             everywhere(OrientationPath.SINGLE_AXIS, count, np.int8),
+            no,
         )
 
     @property
@@ -93,14 +98,20 @@ class ToolOrientations:
         turn_part: without a TCP mode rotary axes turn the part."""
         self._given, self._turned, self.turn_part = words, turned, turn_part
         self._tcp = words.modal.force[Group.TCP] == 1
-        turning = ~words.modal.has(Once.CALL)  # words of G65 are variables of what it calls
-        self._used = np.array([bool(turning[words.words(one).block].any()) for one in _ROTARY_KEYS])
+        self._used = np.array([len(words.words(one)) > 0 for one in _ROTARY_KEYS])
         others = (*words.control.vector, *words.control.euler)
         self._none = not self._used.any() and not any(len(words.words(one)) for one in others)
+        self._none &= not words.noted("spin").any() and not directing(words).any()
         if not self._none:
             self._kind, self._stating = _kinds(words, self._tcp, bool(self._used.any()))
+            self._tilts = ToolTilts.of(words, np.array(_ROTARY_KEYS)[self._used])
         self.orientations: list[OrientationWords] = []
         self._number: dict[tuple[int, int], int] = {}
+
+    @property
+    def turning_part(self) -> Bools:
+        """(3,) words A, B, C with which the program turns the part where no TCP mode is in force."""
+        return self._used & self.turn_part
 
     def of(self, trace: Trace, where: Positions, rows: Ints, first: int, rapid: Bools) -> ToolOrientation:
         """Of motions in blocks ``rows`` (N,) of ``where``, which starts at block ``first``; rapid (N,): air."""
@@ -116,10 +127,12 @@ class ToolOrientations:
             _machine(where, rows, rapid, turning, self._tcp[blocks], self._kind[blocks], result)
         if tool.any():
             self._along_planes(trace, where, rows, blocks, tool, result)
+        if not self._none and (left := ~self._tcp[blocks] & self._tilts.left(trace, blocks)).any():
+            result.wrong[left], result.rotation[left] = 4, np.nan
         if self._none:
             return result
         kind = self._kind[blocks]
-        inside = self._tcp[blocks] & (kind != _NOWHERE)
+        inside = self._tcp[blocks] & (kind >= 0)
         given = self._given.part(first, first + len(where.frame))
         moved = np.array([frame.shift[3:].any() for frame in where.frames])
         pairs = np.stack([kind, np.where(kind == ROTARY, 0, where.frame[rows])], axis=1)
@@ -143,6 +156,10 @@ class ToolOrientations:
             known = np.isfinite(values[:, columns]).all(axis=1)
             if one == VECTOR:
                 known &= values.any(axis=1)
+            if one != ROTARY:
+                in_machine = self._by_machine(blocks[here])
+                known &= ~(in_machine & self._in_turned_frame(trace, blocks[here]))
+                result.in_machine[here] = in_machine
             result.wrong[here[~known]] = 2
             good = here[known]
             result.rotation[here] = np.nan
@@ -177,6 +194,16 @@ class ToolOrientations:
             if self._turned is not None:
                 direction = swing(where.frames[frame].turn[None, :, 2])
                 result.rotation[here] = direction @ self._turned
+
+    def _by_machine(self, blocks: Ints) -> Bools:
+        """(n,) ``blocks`` (n,) whose tool vector is in coordinates of the machine, or may be."""
+        machine = self._given.modal.force[Group.ORIENTED]
+        return np.asarray((machine[self._stating[blocks]] != 0) | (machine[blocks] != 0))
+
+    def _in_turned_frame(self, trace: Trace, blocks: Ints) -> Bools:
+        """(n,) ``blocks`` (n,) whose tool vector is stated, or used, where a frame of the program turns the part."""
+        turned = np.array([not np.array_equal(frame.turn, np.eye(3)) for frame in trace.frames])
+        return np.asarray(turned[trace.frame_of(self._stating[blocks])] | turned[trace.frame_of(blocks)])
 
     def _path(self, kind: int) -> OrientationPath:
         """How the orientation runs between two blocks that state it by words of a kind."""
@@ -233,7 +260,7 @@ def _kinds(words: BlockWords, tcp: Bools, rotary: bool) -> tuple[Ints, Ints]:
         if keys:
             has = words.has(*keys)
             stated[has], marks[has] = kind[has], True
-            stated[has & (euler < 0) & (kind != VECTOR)] = _NOWHERE
+            stated[has & (euler < 0) & (kind != VECTOR)] = _UNREAD
     if rotary:
         has = words.has(*_ROTARY_KEYS)
         stated[has], marks[has] = ROTARY, True
@@ -245,7 +272,9 @@ def _kinds(words: BlockWords, tcp: Bools, rotary: bool) -> tuple[Ints, Ints]:
     fresh = marks | lost | changed
     at = np.maximum.accumulate(np.where(fresh, np.arange(n, dtype=np.int32), np.int32(0)))
     kind = stated[at]
-    return np.where((kind == _NOWHERE) & rotary, np.int8(ROTARY), kind), at
+    kind = np.where((kind == _NOWHERE) & rotary, np.int8(ROTARY), kind)
+    # the turn of the tool about its axis, once it is stated, stays
+    return np.where(np.logical_or.accumulate(words.noted("spin")), np.int8(_UNREAD), kind), at
 
 
 def _machine(
@@ -257,8 +286,8 @@ def _machine(
     away = (np.abs(end) > WHOLE).any(axis=1) | (~rapid & (np.abs(start) > WHOLE).any(axis=1))
     wrong = ~tcp & (unknown | away | (kind > ROTARY))
     result.wrong[wrong] = 1
-    result.wrong[tcp & (kind == _NOWHERE)] = 2
-    result.rotation[wrong | (tcp & (kind == _NOWHERE))] = np.nan
+    result.wrong[tcp & (kind < 0)] = 2
+    result.rotation[wrong | (tcp & (kind < 0))] = np.nan
 
 
 def _orientation(

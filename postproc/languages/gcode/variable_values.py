@@ -6,7 +6,13 @@ import math
 import re
 from collections.abc import Mapping
 
-from postproc.languages.gcode.expression_values import FANUC, LINUXCNC, ExpressionLanguage, evaluate
+from postproc.languages.gcode.expression_values import (
+    FANUC,
+    LINUXCNC,
+    SINUMERIK,
+    ExpressionLanguage,
+    evaluate,
+)
 
 _NUMBERED = re.compile(r"#(\d{1,9})")
 _PARAMETER = re.compile(r"R\d+")
@@ -19,7 +25,7 @@ class VariableValues:
     """name -> value; what is absent is not known.
 
     volatile: names that are never known.  parallel: the assignments of a block hold after it, so that its words and its
-    other assignments have the values from before it.
+    other assignments have the values from before it.  in_turn: its assignments are made from left to right.
     """
 
     def __init__(self, language: ExpressionLanguage, known: Mapping[str, float], control: str) -> None:
@@ -29,8 +35,11 @@ class VariableValues:
         self._shared: dict[str, float] = {}
         self._own: dict[str, float] = {}  # what a subprogram does not see
         self._put(known)
+        self._assigned: set[str] = set()
+        self._other_code = False
         self.volatile: set[str] = set()
         self.parallel = language is LINUXCNC
+        self.in_turn = language is SINUMERIK
         self.result = math.nan
 
     def evaluate(self, text: str, without: set[str]) -> tuple[float, list[str]]:
@@ -69,6 +78,7 @@ class VariableValues:
         if not name:
             self.forget()
             return
+        self._assigned.add(name)
         number = _NUMBERED.fullmatch(name)
         system = number is not None and int(number[1]) >= _SYSTEM.get(id(self._language), 0)
         if math.isnan(value) or system:
@@ -87,8 +97,13 @@ class VariableValues:
 
     def forget(self) -> None:
         """Code that was not read ran."""
+        self._other_code = True
         self._shared.clear()
         self._own.clear()
+
+    def can_be_bound(self, name: str) -> bool:
+        """Whether a value that the cell states would hold here: nothing that ran up to here may have set another."""
+        return not self._other_code and name not in self._assigned and name not in self.volatile
 
     def is_local(self, name: str) -> bool:
         known = self._local.get(name)

@@ -65,9 +65,9 @@ class Note(NamedTuple):
 
     value: the expression of a word, see ``value_note``; assign: an assignment; if: the condition of the rest of the
     block; open, close, between, while: a loop or a branch; jump, label, call, program, tape: as in the text; base: a
-    work offset is written; tool: a tool is called by its name; corner, axis, polar, frame, swivel: a word of
-    that kind; cycle: a cycle of the control is called;
-    unknown: text that is not understood."""
+    work offset is written; tool: a tool is called by its name; corner, axis, polar, frame, swivel, spin: a word
+    of that kind; cycle: a cycle of the control is called;
+    arguments: the letters of a block with G65 in their order; unknown: text that is not understood."""
 
     block: int
     kind: str

@@ -29,6 +29,7 @@ from postproc.languages.gcode.writer_text import (
     TURNED,
     ProgrammedWords,
 )
+from postproc.languages.gcode.written_lines import overlong
 from postproc.languages.gcode.written_motions import WrittenMotions
 from postproc.toolpath import Kind
 
@@ -84,7 +85,10 @@ def _written(style: Style, motions: WrittenMotions, before: Ends) -> tuple[Edits
     literals = _literals(places, text, motions, sheet, present)
     missing = _texts(sheet, sheet.write & ~present)
     blocks = BlockInsertions(style, places, text, motions.row, motions.role, convert, missing)
-    return Edits.joined(literals, insertions(blocks)), held, after
+    edits = Edits.joined(literals, insertions(blocks))
+    edited = np.unique(motions.row[motions.own & ~motions.fixed])
+    held |= dict.fromkeys(overlong(edits, places, edited, style.longest).tolist(), "GCW004")
+    return edits, held, after
 
 
 @dataclass(frozen=True, eq=False)
@@ -365,6 +369,7 @@ _MESSAGES = {
     "GCW001": "the corrected arc cannot be written in the form of its block",
     "GCW003": "the correction is as large as the distance from R to the depth of the hole",
     "GCW002": "the words of this block cannot express the corrected orientation",
+    "GCW004": "the line of the corrected block would be longer than the control reads",
 }
 
 

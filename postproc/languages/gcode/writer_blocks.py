@@ -32,11 +32,13 @@ _BLANK = re.compile(rb"[ \t]")
 
 @dataclass(frozen=True)
 class Style:
-    """How a program is written: its newline; spaced: blocks have blanks between their words; two_digits: G01 for G1."""
+    """How a program is written: its newline; spaced: blocks have blanks between their words; two_digits: G01 for G1;
+    longest: bytes of a line without its end that the control reads, None for any."""
 
     newline: bytes
     spaced: bool
     two_digits: bool
+    longest: int | None = None
 
     @staticmethod
     def of(program: Program) -> Style:
@@ -53,7 +55,9 @@ class Style:
         verbs = part.verb[part.verb >= 0][:1].tolist()
         said = part.text.words
         two = any(len(raw[int(said.start[v]) : int(said.stop[v])].strip()) > 1 for v in verbs)
-        return Style(document.newline, not gaps or any(gaps), two)
+        limit = places.control.longest_line
+        longest = None if limit is None else limit - len(document.newline)
+        return Style(document.newline, not gaps or any(gaps), two, longest)
 
 
 @dataclass(frozen=True, eq=False)

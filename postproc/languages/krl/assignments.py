@@ -22,6 +22,7 @@ from postproc.languages.krl.modal_state import NAN, OVERRIDES, FrameIndex, Recor
 from postproc.languages.krl.motion_rows import RowRefusal
 from postproc.languages.krl.spatial import ZERO
 from postproc.languages.krl.statement_effects import BAS_COMMANDS, MODAL, READS_POSITION, bas
+from postproc.languages.krl.system_variables import INERT
 from postproc.languages.krl.target import (
     AXES,
     COMPONENTS,
@@ -37,6 +38,7 @@ from postproc.toolpath import ArcFrame, OrientationMode
 
 _SIMPLE = re.compile(rb"[A-Z_$][A-Z0-9_$]*+\Z")
 _DATA = re.compile(rb"(BASE|TOOL)_DATA[ \t]*\[([^\]]*)\][ \t]*\Z", re.I)
+_LEFT_OF_DATA = re.compile(rb":[ \t]*(?:BASE|TOOL)_DATA[ \t]*+\[[^\[\]]*+\][ \t]*+\Z", re.I)
 _OF_RECORD = re.compile(rb"S(TOOL2?|BASE)[ \t]*\(([^()]*)\)[ \t]*\Z", re.I)
 _SPEED = re.compile(rb"SVEL_CP[ \t]*\(([^(),]*),[^(),]*,([^(),]*)\)[ \t]*\Z", re.I)
 _ROUNDING = re.compile(rb"SAPO(?:_PTP)?[ \t]*\(([^()]*)\)[ \t]*\Z", re.I)
@@ -99,6 +101,9 @@ def assign(run: ExecutionContext, statement: Statement, assignment: Assignment, 
         state.axis_record = _record(run, assignment, state.axis_record)
     elif not name.startswith(b"$"):
         _set_variable(run, assignment)
+    elif name not in INERT and not name.startswith(b"$LOAD"):
+        message = f"what {shown(name)} does to motions is not known; they are read as if it was not set"
+        run.add_finding("KRL037", message, statement)
 
 
 def with_clause(run: ExecutionContext, statement: Statement, clause: bytes) -> RowRefusal | None:
@@ -284,6 +289,9 @@ def _assigned_frame(
     numbers = target.numbers if isinstance(target, KrlTarget) else None
     if numbers is not None:
         return run.frames.known(None, numbers, line)
+    if _LEFT_OF_DATA.search(value):
+        why = "a product with a frame of the controller on its right is not read; write it as six numbers"
+        return UnknownValue("KRL012", f"'{shown(value)}': {why}")
     return UnknownValue("KRL012", f"'{shown(value)}' does not consist of six numbers")
 
 

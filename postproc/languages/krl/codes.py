@@ -304,5 +304,13 @@ CODES = define(
             action="Repeat the comment before the motion.",
             example="A motion after an IF in which `;FORCE 0 100 0` is.",
         ),
+        "KRL037": Code(
+            "warning",
+            "variable of the controller whose effect is not known",
+            meaning="The program sets a variable, and this tool does not know what that does to motions.",
+            consequence="Motions, frames and speeds are read as if it was not set.",
+            action="Check in the controller's documentation that it changes no path, speed, tool, base or load.",
+            example="`$TECH[1].MODE=#CYCLE`, by which the controller weaves.",
+        ),
     }
 )

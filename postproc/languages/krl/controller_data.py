@@ -26,6 +26,42 @@ _ENTRY = re.compile(
 )
 
 
+_LOAD = re.compile(
+    rb"^[ \t]*+LOAD_DATA[ \t]*+\[[ \t]*+(\d{1,4})[ \t]*+\][ \t]*+=[ \t]*+\{[ \t]*+"
+    rb"M[ \t]++(\d++\.?+\d*+(?:E[-+]?\d++)?+)[ \t]*+,[ \t]*+CM[ \t]*+(\{[^{}\r\n]*+\})",
+    re.I | re.M,
+)
+
+Load = tuple[float, float, float, float]
+
+
+def declared_loads(documents: Iterable[Document]) -> dict[int, Load]:
+    """Number of a tool -> mass [kg] and its centre [m] on the flange as ``LOAD_DATA`` of the controller's own files
+    states them; what two of them state differently is left out, and so is what has no mass."""
+    found: dict[int, Load] = {}
+    different: set[int] = set()
+    for document in documents:
+        if "config" not in document.path.stem.lower():
+            continue
+        for said in _LOAD.finditer(document.raw):
+            number, mass, centre = int(said[1]), float(said[2]), parse(said[3], 0, -1)
+            if not isinstance(centre, KrlTarget) or centre.numbers is None or not mass > 0:
+                continue
+            x, y, z = (value * MM for value in centre.numbers[:3])
+            if found.setdefault(number, (mass, x, y, z)) != (mass, x, y, z):
+                different.add(number)
+    return {number: load for number, load in found.items() if number not in different}
+
+
+def with_loads(loads: Mapping[int, Load], used: Ints, frames: tuple[FrameRef, ...]) -> tuple[FrameRef, ...]:
+    """The frames with the ``loads`` of those that motions ``use`` (N,) as tools."""
+    tools = set(np.unique(used[used >= 0]).tolist()) if loads else set()
+    return tuple(
+        replace(frame, load=loads.get(frame.entry or 0)) if index in tools else frame
+        for index, frame in enumerate(frames)
+    )
+
+
 def declared_frames(documents: Iterable[Document]) -> dict[str, tuple[Numbers, str]]:
     """``BASE_DATA[n]`` or ``TOOL_DATA[n]`` -> X..C [mm, deg] as the controller's own files ($config.dat) state it, and
     the file; what two of them state differently is left out, and so are tools of zeros, which a controller has before

@@ -48,7 +48,8 @@ class Declarations:
     values: points and constants; records: FDAT, LDAT, PDAT (key -> value); types: as they are declared; lines: name of
     a point with its index -> its declaration's line, where another one can be after; shared: names that other
     programs know too; origin: what only another file declares -> that file; frames: entries of
-    BASE_DATA and TOOL_DATA in the controller's own files -> X..C [mm, deg], and the file.
+    BASE_DATA and TOOL_DATA in the controller's own files -> X..C [mm, deg], and the file; loads: number of a tool ->
+    mass [kg] and centre [m] there.
     """
 
     values: dict[bytes, Entry] = field(default_factory=dict)
@@ -59,6 +60,7 @@ class Declarations:
     shared: set[bytes] = field(default_factory=set)
     origin: dict[bytes, str] = field(default_factory=dict)
     frames: dict[str, tuple[Numbers, str]] = field(default_factory=dict)
+    loads: dict[int, tuple[float, float, float, float]] = field(default_factory=dict)
 
 
 def read_references(result: Declarations, documents: Iterable[Document]) -> None:

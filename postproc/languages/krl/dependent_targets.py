@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections import defaultdict
+
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
@@ -19,7 +22,7 @@ EXACT = 1e-9
 class DependentTargets:
     """How far the written end of each row is from where the program had it, row by row.
 
-    depends (N,): the row takes components over from the row before, or is relative to it.  completed (N, 6):
+    depends (N,): the row takes components over from the motion before, or is relative to it.  completed (N, 6):
     components that it takes over and that must be written; renewed (N,): relative motions that must be absolute.
     deviation (N, 6) [mm, deg]: written value less that of the program.
     """
@@ -34,6 +37,56 @@ class DependentTargets:
         self.renewed = np.zeros(len(touched), dtype=bool)
         self.deviation: Floats = np.zeros((len(touched), 6) if self.depends.any() else (0, 6))
         self._inexact = np.zeros(len(touched), dtype=bool)
+        self._after_moved = self._find_after_moved()
+
+    def _find_after_moved(self) -> dict[int, bool]:
+        """Dependent rows that others than the row before may precede -> whether the written end of one of these may be
+        another one than the program has.  On all paths they inherit the same of the program, but not of a plan."""
+        starts = {
+            row: before for row, before in self.task.path.sequence.predecessors.items()
+            if before != (row - 1,) and self.depends[row]
+        }  # fmt: skip
+        if not starts:
+            return {}
+        chained = self.depends.copy()
+        chained[list(starts)] = False
+        moved = self.touched | (self.task.inserted > 0)
+        first = np.maximum.accumulate(np.where(chained, 0, np.arange(len(moved))))
+        counted = np.cumsum(moved)
+        moved = counted - counted[first] + moved[first] > 0
+        users: defaultdict[int, list[int]] = defaultdict(list)
+        for row, before in starts.items():
+            for source in before:
+                users[source].append(row)
+        todo = [row for source, rows in users.items() if source >= 0 and moved[source] for row in rows]
+        found = dict.fromkeys(starts, False)
+        while todo:
+            row = todo.pop()
+            if found[row]:
+                continue
+            found[row] = True
+            while not moved[row]:
+                moved[row] = True
+                todo += users.get(row, ())
+                if row + 1 < len(moved) and chained[row + 1]:
+                    row += 1
+        return found
+
+    def moved_before(self, row: int) -> set[int]:
+        """The moved rows from whose ends a dependent row takes components over, or to which it is relative."""
+        found: set[int] = set()
+        todo, seen = [row], {row}
+        while todo:
+            at = todo.pop()
+            for source in self.task.path.sequence.predecessors.get(at, (at - 1,)) if self.depends[at] else ():
+                if source < 0 or source in seen:
+                    continue
+                seen.add(source)
+                if self.touched[source]:
+                    found.add(source)
+                else:
+                    todo.append(source)
+        return found
 
     def follow(self) -> None:
         """Goes along the rows that depend on the one before."""
@@ -46,6 +99,8 @@ class DependentTargets:
         for low in range(0, len(dependent), BLOCK):
             rows = dependent[low : low + BLOCK]
             before = np.where(rows[:, None] > 0, self.deviation[rows - 1], 0.0)  # the first depends on none
+            for k in np.flatnonzero(np.isin(rows, list(self._after_moved))).tolist():
+                before[k] = math.inf if self._after_moved[int(rows[k])] else 0.0
             active = self.touched[rows] | (self.task.inserted[rows] > 0)
             # Rows far after a change need not be looked at.
             if active.any() or before.any():
@@ -59,17 +114,19 @@ class DependentTargets:
         wish: list[list[float]] = _wrapped(wanted - said.own).tolist()
         half: list[float] = (0.5 * SLACK * 10.0**-task.least).tolist()
         moves = set(np.flatnonzero((~kept).any(axis=1)).tolist())
+        # Angles that do not count ($ORI_TYPE=#CONSTANT) are not written: what follows would take them over.
+        oriented = ~task.path.keeps_orientation[rows]
         for k, (row, bits, inserted, relative, touched) in enumerate(
             zip(
                 rows.tolist(),
-                task.places.inherits[rows].tolist(),
+                (task.places.inherits[rows] & np.where(oriented, 0b111111, 0b000111)).tolist(),
                 (task.inserted[rows] > 0).tolist(),
                 task.is_relative[rows].tolist(),
                 self.touched[rows].tolist(),
                 strict=True,
             )
         ):
-            taken = last if at == row - 1 else before[k]
+            taken = last if at == row - 1 and row not in self._after_moved else before[k]
             at, last = row, [0.0] * 6
             if not (touched or inserted or any(taken)):
                 continue

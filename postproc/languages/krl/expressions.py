@@ -331,8 +331,10 @@ class _Parser:
     def _aggregate(self) -> Value:
         stop = self.text.find(b"}", self.place)
         start = self.after - 1
-        if stop < 0 or b"{" in self.text[start + 1 : stop]:
+        if stop < 0:
             raise self._unknown("its braces do not match")
+        if b"{" in self.text[start + 1 : stop]:
+            raise self._unknown("an aggregate within another one is not read; assign it as a component")
         found = parse(self.text[start : stop + 1], 0, -1, lambda inner: evaluate(inner, self.lookup))
         if isinstance(found, UnknownValue):
             raise _NotConstant(found)

@@ -15,7 +15,7 @@ from postproc.base.findings import Finding
 from postproc.base.memory import without_garbage_collection
 from postproc.languages.dialect import MARK, Program
 from postproc.languages.krl.aliases import aliases, parameters_of
-from postproc.languages.krl.controller_data import declared_frames, entry_of, start_with
+from postproc.languages.krl.controller_data import declared_frames, declared_loads, entry_of, start_with
 from postproc.languages.krl.data import (
     Declarations,
     at_the_start,
@@ -53,7 +53,7 @@ _TURNING = re.compile(
 )
 """Where the tool turns otherwise than usual; it starts with what is no letter, so that it is found fast."""
 
-_OVERRIDE = re.compile(rb"\$OV_(?:PRO|ROB)", re.I)
+_OVERRIDE = re.compile(rb"\$(?:OV_(?:PRO|ROB|APPL)|RED_VEL)", re.I)
 
 _MARK = f";{MARK}".encode()
 _MARKER = re.compile(rb"(?:\xef\xbb\xbf)?([ \t]*" + _MARK + rb"[^\r\n]*)")
@@ -84,7 +84,7 @@ def read(
     data = [*references, *(one for one in siblings if not is_module(one))]
     read_references(declarations, data)
     bind_symbols(declarations, symbols, own)
-    declarations.frames = declared_frames(data)
+    declarations.frames, declarations.loads = declared_frames(data), declared_loads(data)
     others = read_modules(siblings, data, symbols)
     effects = visible(others, declarations)
     surveyed = program_structure(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from postproc.languages.krl.lexing import NAME, Call, Statement, cached, without_strings
-from postproc.languages.krl.statement_effects import called_in, is_harmless
+from postproc.languages.krl.statement_effects import SYSTEM, called_in, is_harmless
 
 EVENTS = frozenset([b"INTERRUPT", b"TRIGGER", b"GLOBAL"])
 """First words of statements that say what happens at a time of its own."""
@@ -17,6 +17,17 @@ _NO_FUNCTIONS = frozenset([b"WHEN", b"DO", b"ON", b"OFF", b"ENABLE", b"DISABLE",
 def later_actions(statement: Statement) -> list[Call]:
     """What an interrupt or a trigger calls or assigns, the latter as a call without arguments."""
     return [Call(name.upper(), given) for name, given in _LATER.findall(statement.code)]
+
+
+def starts_nothing(statement: Statement) -> bool:
+    """Whether it lets nothing happen later that matters to motions: INTERRUPT OFF, or a TRIGGER that sets an output."""
+    if statement.word == b"TRIGGER":
+        return not later_functions(statement.code) and all(
+            is_harmless(one.name) or (one.name.startswith(b"$") and one.name not in SYSTEM)
+            for one in later_actions(statement)
+        )
+    words = statement.code.upper().split()[:2]
+    return words in ([b"INTERRUPT", b"OFF"], [b"INTERRUPT", b"DISABLE"])
 
 
 @cached

@@ -105,7 +105,7 @@ class Anchor:
 
 PointFrames = tuple["FrameIndex | UnknownValue", "FrameIndex | UnknownValue"]
 
-OVERRIDES = frozenset([b"$OV_PRO", b"$OV_ROB"])
+OVERRIDES = frozenset([b"$OV_PRO", b"$OV_ROB", b"$OV_APPL", b"$RED_VEL"])
 NO_BASE = UnknownValue("KRL005", "no $BASE is set before it")
 NO_TOOL = UnknownValue("KRL005", "no $TOOL is set before it")
 
@@ -280,9 +280,13 @@ def _joined_points(
     if same and one.point is not None and other.point is not None:
         pairs = zip(one.point, other.point, strict=True)
         point = six([a if is_same(a, b) else NAN for a, b in pairs])
-        if any(value == value for value in point):
-            why = one.point_unknown if point == one.point else _varies(one, other)
-            return point, one.point_frames, one.anchor, why
+        why = one.point_unknown if point == one.point else _varies(one, other)
+        return (
+            point,
+            one.point_frames,
+            one.anchor,
+            why,
+        )  # with a constant orientation a point may need no more
     return None, None, None, _varies(one, other)
 
 

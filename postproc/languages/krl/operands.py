@@ -143,6 +143,10 @@ def operand_at(run: ExecutionContext, code: bytes, at: int, place: tuple[int, in
     return _variable(run, named, start_at, end)
 
 
+_CALLS = re.compile(rb"[A-Za-z0-9_$][ \t]*+\(")
+"""A function, which may return a point that omits components."""
+
+
 class _OperandName(NamedTuple):
     """A variable that is named as a target: its name and components (upper case), what is in its brackets, its words in
     a message, and what follows."""
@@ -176,6 +180,8 @@ def _variable(run: ExecutionContext, named: _OperandName, start: int, end: int) 
         path = b"[" + indices + b"]" + path
     has = run.variables.get(name, path)
     value = run.resolve(name, path, has)
+    if isinstance(value, UnknownValue) or (isinstance(value, KrlTarget) and value.unknown is not None):
+        run.mentioned.add(name)  # whatever it may be stays what it is
     line = run.declarations.lines.get(name + path)
     if run.routine is not None and name in run.routine.types:
         line = None
@@ -225,5 +231,6 @@ def _computed(run: ExecutionContext, text: bytes, start: int, end: int) -> Opera
     why = value.message if isinstance(value, UnknownValue) else f"'{shown(text)}' is not a point"
     code = value.code if isinstance(value, UnknownValue) else "KRL002"
     return Operand(
-        UnknownValue(code, f"its target is computed: {why}"), start, end, None, reads or text.startswith(b"{")
-    )
+        UnknownValue(code, f"its target is computed: {why}"), start, end, None,
+        reads or text.startswith(b"{") or _CALLS.search(text) is not None,
+    )  # fmt: skip

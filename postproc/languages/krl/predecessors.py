@@ -48,12 +48,12 @@ def predecessors(rows: MotionRows, continues: Bools) -> dict[int, tuple[int, ...
         if rows.never_from is not None and row >= rows.never_from:
             continue
         sources = rows.sources_of.get(row)
-        known = {row - 1} if sources is None else _few(rows, sources, many)
+        known = {row - 1} if sources is None else distinguished_sources(rows, sources, many)
         found[row] = tuple(sorted(known)) or (ELSEWHERE,)
     return found
 
 
-def _few(rows: MotionRows, sources: frozenset[Source], many: set[Source]) -> set[int]:
+def distinguished_sources(rows: MotionRows, sources: frozenset[Source], many: set[Source]) -> set[int]:
     """The rows after sources, none where they are more than ``MOST``; many: meetings of so many, to which
     those are added that are found to."""
     seen: set[Source] = set()

@@ -16,7 +16,7 @@ from postproc.languages.krl.execution_context import Flow
 from postproc.languages.krl.expressions import Value
 from postproc.languages.krl.external_axes import by_themselves
 from postproc.languages.krl.flow_frames import Restart, Unfollowed
-from postproc.languages.krl.later_changes import EVENTS, later_actions, later_functions
+from postproc.languages.krl.later_changes import EVENTS, later_actions, later_functions, starts_nothing
 from postproc.languages.krl.lexing import (
     SPLINES,
     Assignment,
@@ -294,7 +294,8 @@ class ProgramFlow(Calls):
         elif item.word in EVENTS:
             if item.word == b"TRIGGER":
                 run.state.no_insert = TRIGGERED
-            self._later(item)
+            if not starts_nothing(item):
+                self._later(item)
         return pc + 1
 
     def _forget_aliases(self, item: Statement) -> None:

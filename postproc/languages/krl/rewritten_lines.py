@@ -20,7 +20,9 @@ SHARED = "KRL007"
 HELP = "Give each motion its own point, or write the line once for each run."
 
 _NAME = re.compile(rb"[A-Za-z_$][A-Za-z0-9_$]*")
-_WORDS = re.compile(rb"(?<![A-Za-z0-9_$])([ST]|E[1-6])(?![A-Za-z0-9_$])([^,{}]*+)([,}]?)", re.I)
+_WORDS = re.compile(
+    rb"[{,:][ \t]*+([ST]|E[1-6])(?![A-Za-z0-9_$])((?:\[[^\[\]{}]*+\]|[^,:{}\[\]])*+)(?=[,}])", re.I
+)
 _FOLD = re.compile(
     rb"^[ \t]*;[ \t]*(?:(ENDFOLD)|FOLD([ \t]+S?(?:PTP|LIN|CIRC|SPL)(?![A-Za-z0-9_]))?)", re.I | re.M
 )
@@ -34,7 +36,7 @@ def aggregate(texts: Sequence[bytes], words: bytes) -> bytes:
 
 def carried(operand: bytes) -> bytes:
     """S, T and external axes of an aggregate in the line."""
-    return b",".join(key + b" " + value.strip(b" \t") for key, value, end in _WORDS.findall(operand) if end)
+    return b",".join(key + b" " + value.strip(b" \t") for key, value in _WORDS.findall(operand))
 
 
 class RewrittenLines:

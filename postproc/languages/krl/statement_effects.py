@@ -124,6 +124,8 @@ SYSTEM: dict[bytes, str] = {
     b"$VEL": "feed",
     b"$OV_PRO": "override",
     b"$OV_ROB": "override",
+    b"$OV_APPL": "override",
+    b"$RED_VEL": "override",
     b"$APO": "apo",
     b"$IPO_MODE": "mode",
     b"$ORI_TYPE": "turning",

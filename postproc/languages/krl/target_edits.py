@@ -106,6 +106,9 @@ def _targets(task: KrlWritePlan, rows: Ints, completed: Bools, lines: RewrittenL
         if row in places.relative:
             lines.absolute(row, texts, [fixed_one(v, int(task.least[0])) for v in via])
             continue
+        if task.runs_unlike(row):
+            lines.refuse(row, "its line runs several times, and what it inherits is not known each time")
+            continue
         inherits = [i for i in range(6) if places.inherits[row] >> i & 1]
         _, start, stop, _ = places.motion[row].tolist()
         end = TargetEdit(

@@ -11,15 +11,22 @@ from numpy.typing import NDArray
 from postproc.base.arrays import Bools, Floats, Ints, is_shared
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
-from postproc.languages.core.motion_sources import ELSEWHERE, Meeting
+from postproc.languages.core.motion_sources import ELSEWHERE, Meeting, Source
 from postproc.languages.core.row_facts import OTHER_PATHS, LockedRows, axis_targets, grouped, used_frames
 from postproc.languages.krl.advance_run import stopped_motions
 from postproc.languages.krl.comments_at_rows import take_comments
-from postproc.languages.krl.controller_data import with_declared
+from postproc.languages.krl.controller_data import with_declared, with_loads
 from postproc.languages.krl.execution_context import ExecutionContext
+from postproc.languages.krl.krl_loads import krl_loads
 from postproc.languages.krl.motion_rows import MotionRows, RowRefusal
 from postproc.languages.krl.motion_table import MotionTable, Spots
-from postproc.languages.krl.predecessors import continuous, expanded, predecessors, single_sources
+from postproc.languages.krl.predecessors import (
+    continuous,
+    distinguished_sources,
+    expanded,
+    predecessors,
+    single_sources,
+)
 from postproc.languages.krl.source_map import KrlSourceMap
 from postproc.toolpath import (
     COMPUTED,
@@ -54,6 +61,7 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
     refused = _refused(rows, table)
     table.base, frames = with_declared(run.declarations.frames, b"BASE", table.base, tuple(run.frames.refs))
     table.tool, frames = with_declared(run.declarations.frames, b"TOOL", table.tool, frames)
+    frames = with_loads(run.declarations.loads, table.tool, frames)
     table.base, table.tool, used = used_frames(table.base, table.tool, frames)
     table.blend *= MM
     table.inserted *= MM
@@ -87,7 +95,7 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
             locked=_locked(rows, table, refused),
             no_insert_before=_no_insert_before(rows, several, continues),
             spline_headers=_entries(rows, several),
-            orientation_programmed=_correctable_orientations(table),
+            orientation_programmed=_correctable_orientations(rows, table, single),
             inserted_approximation=_read_only(table.inserted),
         ),
         partial_targets=PartialTargets(anchor, given),
@@ -100,6 +108,7 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
         configuration=Configuration({"status": _read_only(table.status), "turn": _read_only(table.turn)}),
         orientation_control=OrientationControl(mode=_read_only(table.orientation)),
         remarks=ProgramComments(annotations, tuple(rows.comments)),
+        stated_loads=krl_loads(rows.document),
     )
     found = None if table.spots is None else _places(rows, table, table.spots)
     return (
@@ -179,12 +188,16 @@ def _refuse_other_calls(run: ExecutionContext, table: MotionTable) -> None:
 
 
 def _refuse_several_starts(rows: MotionRows, table: MotionTable, single: Bools) -> None:
-    """Motions that build on the one before them, where several may be that one: a correction of one of these would
-    change them."""
+    """Motions that build on others than the row before them, and are not written without these: arcs, and what starts
+    where it is not known which motion precedes it."""
+    many: set[Source] = set()
     for row in np.flatnonzero(~single).tolist():
         kind = table.kind[row]
         if row in rows.reasons or kind == Kind.AXIS or not (kind == Kind.CIRC or row in rows.builds_on):
             continue
+        before = distinguished_sources(rows, rows.sources_of[row], many)
+        if kind != Kind.CIRC and before and ELSEWHERE not in before:
+            continue  # on all paths it inherits the same, and the writer completes it where one of them moves
         code = "KRL009" if kind == Kind.CIRC else "KRL008" if row in rows.relative else "KRL004"
         what = {"KRL009": "its start", "KRL008": "what it is relative to", "KRL004": "what it omits"}[code]
         why = f"several motions may precede it, and {what} is corrected with them"
@@ -237,15 +250,19 @@ def _entries(rows: MotionRows, several: Ints) -> dict[int, int]:
     return {row: line for row, line in rows.entries.items() if row not in again}
 
 
-def _correctable_orientations(table: MotionTable) -> Bools:
+def _correctable_orientations(rows: MotionRows, table: MotionTable, single: Bools) -> Bools:
     """(N,) motions whose orientation can be corrected by their text: not those that keep the one with which they start
-    ($ORI_TYPE=#CONSTANT), nor the motion before, whose orientation all of them would take over."""
+    ($ORI_TYPE=#CONSTANT), nor any motion that may precede them, whose orientation they would take over."""
     keep = (table.orientation == OrientationMode.CONSTANT) & np.isin(
         table.kind, (Kind.LIN, Kind.CIRC, Kind.SPL)
     )
     if not keep.any():
         return np.broadcast_to(True, keep.shape)
-    return _read_only(~(keep | np.append(keep[1:], False)))
+    fixed = keep | np.append(keep[1:], False)
+    elsewhere = [rows.sources_of.get(row, ()) for row in np.flatnonzero(keep & ~single).tolist()]
+    before = expanded(rows, {source for sources in elsewhere for source in sources})
+    fixed[_among(range(len(rows)), before)] = True
+    return _read_only(~fixed)
 
 
 def _stop(table: MotionTable, blends: dict[int, float]) -> dict[int, float]:

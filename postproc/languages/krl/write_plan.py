@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from postproc.base.arrays import Bools, Floats, Ints, differs
 from postproc.base.decimals import decimals_of, fixed_one, literals
 from postproc.base.document import Document
-from postproc.base.geometry import abc_from_rotation
+from postproc.base.geometry import abc_from_rotation, wrapped
 from postproc.base.units import DEG, MM
 from postproc.languages.core.plan_rows import PlanRows
 from postproc.languages.dialect import Plan, Program, WritingSettings
@@ -89,8 +89,23 @@ class KrlWritePlan(PlanRows):
         if not bits.any():
             return None
         rows = np.arange(len(bits), dtype=np.int32)[:, None]
-        left_out = (bits[:, None] >> np.arange(6, dtype=np.uint8)) & 1
-        return np.maximum.accumulate(np.where(left_out == 1, 0, rows), axis=0)
+        left_out = (bits[:, None] >> np.arange(6, dtype=np.uint8)) & 1 == 1
+        elsewhere = {
+            row: next((source for source in before if 0 <= source < row), row)
+            for row, before in sorted(self.path.sequence.predecessors.items())
+            if before != (row - 1,) and bits[row]
+        }  # fmt: skip
+        own = left_out.copy()
+        own[list(elsewhere)] = False
+        given = np.maximum.accumulate(np.where(own, 0, rows), axis=0)
+        if elsewhere:
+            # All motions that may precede such a row give the same numbers: those of the first count.
+            last = np.broadcast_to(rows, given.shape).copy()
+            for row, before in elsewhere.items():
+                if before != row:
+                    last[row] = np.where(left_out[row], last[given[before], np.arange(6)], row)
+            given = last[given, np.arange(6)]
+        return given
 
     @cached_property
     def is_inline(self) -> Bools:
@@ -110,11 +125,28 @@ class KrlWritePlan(PlanRows):
         keys, counts = self._aggregates
         return int(counts[np.searchsorted(keys, insert * len(self.raws) + home)])
 
+    @cached_property
+    def _unlike(self) -> frozenset[int]:
+        """Where statements start that run several times, and whose literals some of their rows do not have: what these
+        rows make of them is not known."""
+        words = self.places.motion[:, 0]
+        if (words[1:] > words[:-1]).all():
+            return frozenset()
+        inline = np.ones(len(words), np.bool_)
+        inline[list(self.places.variables)] = False
+        literals = np.concatenate([words[:, None], self.places.start], axis=1)[inline]
+        starts, counts = np.unique(np.unique(literals, axis=0)[:, 0], return_counts=True)
+        return frozenset(starts[counts > 1].tolist())
+
+    def runs_unlike(self, row: int) -> bool:
+        """Whether the aggregate in the line of a row also serves runs of which nothing is known."""
+        return int(self.places.motion[row, 0]) in self._unlike and row not in self.places.variables
+
     def components(self, rows: Ints) -> Components:
         """What the text says of rows (K,).
 
-        Where no literal states it, the value is that of the toolpath, in the spelling of A, B, C nearest to the
-        literals that there are.
+        Where no literal states it, the value is that of the toolpath, in the spelling of A, B, C that has the literals
+        that there are.
         """
         places, columns = self.places, np.arange(6)
         if self._source_rows is None:
@@ -136,9 +168,7 @@ class KrlWritePlan(PlanRows):
         lacking = np.flatnonzero(~said.all(axis=1))
         if len(lacking):
             where = rows[lacking]
-            angles = abc_from_rotation(np.nan_to_num(self.path.rotation[where])) / DEG
-            near = np.where(said[lacking, 3:], own[lacking, 3:], angles)
-            angles = abc_from_rotation(np.nan_to_num(self.path.rotation[where]), near * DEG) / DEG
+            angles = _spelled(np.nan_to_num(self.path.rotation[where]), own[lacking, 3:], said[lacking, 3:])
             values = np.concatenate([self.path.position[where] / MM, angles], axis=1)
             own[lacking] = np.where(said[lacking], own[lacking], values)
         return Components(own, decimals, start, stop, file)
@@ -170,6 +200,20 @@ class KrlWritePlan(PlanRows):
             else fixed_one(float(wanted[k, i]), int(components.decimals[k, i]))
             for i in range(6)
         ]
+
+
+def _spelled(rotation: Floats, own: Floats, literal: Bools) -> Floats:
+    """(K, 3) [deg] A, B, C of ``rotation`` (K, 3, 3) in the spelling in which those that literals state (``literal``
+    (K, 3)) are ``own`` (K, 3) [deg]."""
+    one = abc_from_rotation(rotation) / DEG
+    # Where B is +-90 only A -+ C is defined: a C that is stated gives A.
+    by = np.where(literal[:, 2] & ~literal[:, 0], np.sign(one[:, 1]) * (own[:, 2] - one[:, 2]), 0.0)
+    near = np.where(literal, own, one)
+    near[:, 0] += by
+    one = abc_from_rotation(rotation, np.stack([near[:, 0], one[:, 1], near[:, 2]], axis=1) * DEG) / DEG
+    two = np.stack([one[:, 0] + 180.0, 180.0 - one[:, 1], one[:, 2] + 180.0], axis=1)
+    off = [np.where(literal, np.abs(wrapped((own - each) * DEG)), 0.0).sum(axis=1) for each in (one, two)]
+    return np.where((off[1] < off[0])[:, None], wrapped(two * DEG) / DEG, one)
 
 
 def other_literal(literal: bytes) -> tuple[float, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -48,6 +49,9 @@ def _parts(
     partial = again & _partial(task, private)
     single, not_moved = single_edits(task, np.flatnonzero(again & ~partial), chain.completed)
     refused.update(not_moved)
+    for row, finding in not_moved.items():
+        for source in sorted(chain.moved_before(row)):
+            refused.setdefault(source, _before_unwritten(task, source, finding))
     if refused:
         return
 
@@ -61,6 +65,13 @@ def _parts(
 
     yield from in_blocks(written, len(touched))
     yield single
+
+
+def _before_unwritten(task: KrlWritePlan, row: int, finding: Finding) -> Finding:
+    """Why a row stays from which another one takes components over that cannot be written: ``finding``."""
+    line, column = task.documents[0].place(int(task.places.motion[row, 0]))
+    why = f"the motion in line {finding.line} builds on this end point and cannot be written"
+    return replace(finding, message=f"{why}: {finding.message}", line=line, column=column)
 
 
 def _enters(task: KrlWritePlan, row: int) -> bool:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from postproc.languages.core.comments_in_force import SPEAKS, VARYING
 from postproc.languages.core.waits import Waits
 from postproc.languages.rapid.declared_data import Usage, walk
-from postproc.languages.rapid.instructions import DISPLACING, HALTING, MODES, WAITING
+from postproc.languages.rapid.instructions import DISPLACING, HALTING, MODES, SCALING, WAITING
 from postproc.languages.rapid.program_state import ProgramState
 from postproc.languages.rapid.syntax_tree import (
     Expression,
@@ -96,8 +96,10 @@ class ModeChanges(NamedTuple):
         names = self.names
         if not names.isdisjoint(DISPLACING):
             state.displaced |= {reason}
-        if not names.isdisjoint((b"VELSET", b"SPEEDREFRESH")):
+        if b"VELSET" in names:
             state.override = None
+        if not names.isdisjoint(SCALING):
+            state.scaled = True
         if b"SINGAREA" in names:
             state.orientation = OrientationMode.UNKNOWN
         if b"CIRPATHMODE" in names:

@@ -74,7 +74,8 @@ CODES = define(
         "RAP010": warning(
             "call of a routine that is not in the file",
             "The called routine may move the robot.",
-            "The position is unknown after the call; data of this module and frames are assumed unchanged.",
+            "The position is unknown after the call; data of this module, frames, speeds (VelSet) and displacements are"
+            " assumed unchanged.",
             "Check what the routine does.",
             "`rToolChange 4;` is declared in another module.",
         ),

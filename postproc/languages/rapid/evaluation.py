@@ -13,6 +13,13 @@ from postproc.base.geometry import rotation_from_abc, rotation_from_vector
 from postproc.base.units import DEG
 from postproc.languages.core.rounded_numbers import WHOLE, are_comparable, computed
 from postproc.languages.rapid.data_types import RECORDS, Components
+from postproc.languages.rapid.function_values import (
+    FUNCTIONS_OF_POSES,
+    ROUNDING,
+    number_function,
+    pose_function,
+    rounded,
+)
 from postproc.languages.rapid.quaternions import quaternion_from_rotation, rotation_from_quaternion
 from postproc.languages.rapid.syntax_tree import (
     AND_AFTER_NOT,
@@ -29,6 +36,7 @@ from postproc.languages.rapid.syntax_tree import (
     OperatorExpression,
     Star,
     StringLiteral,
+    presence_name,
 )
 from postproc.languages.rapid.values import (
     FALSE,
@@ -49,16 +57,6 @@ Typed = tuple[Value, bytes]
 
 ROUNDED = "it is decided by how the controller rounds"
 
-_FUNCTIONS: dict[bytes, Callable[[float], float]] = {
-    b"ABS": abs,
-    b"SQRT": math.sqrt,
-    b"SIN": lambda x: math.sin(x * DEG),
-    b"COS": lambda x: math.cos(x * DEG),
-    b"TAN": lambda x: math.tan(x * DEG),
-    b"ASIN": lambda x: math.asin(x) / DEG,
-    b"ACOS": lambda x: math.acos(x) / DEG,
-    b"ATAN": lambda x: math.atan(x) / DEG,
-}
 _COMPARISONS: dict[bytes, Callable[[float, float], bool]] = {
     b"<": lambda a, b: a < b,
     b">": lambda a, b: a > b,
@@ -174,6 +172,8 @@ class Evaluator:
         if name in self.shadowed:
             return UnknownData(f"{_shown(name)} is computed where the program runs"), b""
         required = [argument.value for argument in arguments if not argument.name]
+        if name == b"PRESENT" and len(arguments) == 1 and isinstance(required[0], Name):
+            return self.look(presence_name(required[0].name))[0], b"BOOL"
         values = [self.value(one) for one in required if one is not None]
         for value in values:
             unknown = unknown_in(value)
@@ -185,14 +185,27 @@ class Evaluator:
             return self._rel_tool(values, arguments), b"ROBTARGET"
         if name in (b"ORIENTZYX", b"NORIENT") and len(required) == len(arguments):
             return _orientation(values), b"ORIENT"
-        function = _FUNCTIONS.get(name)
-        number = number_of(values[0]) if len(values) == len(arguments) == 1 else None
-        if function is not None and number is not None:
-            try:
-                return Leaf(computed(function(number), number)), b"NUM"
-            except (ValueError, OverflowError):
-                return UnknownData(f"{_shown(name)} has no value there"), b"NUM"
+        if name in FUNCTIONS_OF_POSES and len(required) == len(arguments):
+            kind = b"POS" if name == b"POSEVECT" else b"POSE"
+            return pose_function(name, values) or UnknownData(f"{_shown(name)} has no value there"), kind
+        if name in ROUNDING and len(required) == 1:
+            return self._rounded(name, values[0], arguments[1:]), b"NUM"
+        number = number_function(name, values) if len(required) == len(arguments) else None
+        if number is not None:
+            return Leaf(number), b"NUM"
         return UnknownData(f"{_shown(name)} is computed where the program runs"), b""
+
+    def _rounded(self, name: bytes, value: Value, options: tuple[Argument, ...]) -> Value:
+        """Round and Trunc; how many decimals is an option of them."""
+        decimals: float | None = 0.0
+        if options:
+            known = len(options) == 1 and options[0].name == b"DEC" and options[0].value is not None
+            decimals = number_of(self.value(options[0].value)) if known and options[0].value else None
+        number = number_of(value)
+        found = None if number is None or decimals is None else rounded(name, number, decimals)
+        if found is None:
+            return UnknownData(f"what is {ROUNDING[name]} is decided by how the controller rounds")
+        return Leaf(found)
 
     def _rel_tool(self, values: list[Value], arguments: tuple[Argument, ...]) -> Value:
         """The target displaced by dx, dy, dz in tool axes, then turned about the tool's x, the new y and z axes."""

@@ -128,6 +128,11 @@ class RapidExpressionParser:
         token = self.next
         if token.kind == NUMBER:
             self.take()
+            if (
+                token.text[1:2].isalpha() and token.text[1:2] not in b"eE"
+            ):  # its digits are none that can be written
+                value = NumberLiteral(float(int(token.text, 0)), token.start, token.stop)
+                return OperatorExpression(b"+", (value,), token.start, token.stop)
             if not math.isfinite(float(token.text)):
                 raise SyntaxProblem
             return NumberLiteral(float(token.text), token.start, token.stop)

@@ -12,9 +12,11 @@ from postproc.base.units import DEG, MM
 from postproc.languages.core.frame_table import FrameTable
 from postproc.languages.rapid.motion_facts import FrameUse, Problem, item_of, reason_of
 from postproc.languages.rapid.quaternions import rotation_from_quaternion
-from postproc.languages.rapid.values import Leaf, UnknownData, Value, numbers_of, truth_of
+from postproc.languages.rapid.values import Leaf, UnknownData, Value, number_of, numbers_of, truth_of
 from postproc.toolpath import FrameRef
 from postproc.toolpath.initial_state import Symbol
+
+Load = tuple[float, float, float, float]
 
 _KEYS = ("X", "Y", "Z", "A", "B", "C")
 
@@ -43,7 +45,7 @@ class ModuleFrames(FrameTable):
         pose = _pose(item_of(use.value, 1))
         if held is None or pose is None:
             return "RAP005", f"its tool is not known: {self._reason(use)}"
-        return self._posed("tool", pose, self._lines.get(use.name, line))
+        return self._posed("tool", pose, self._lines.get(use.name, line), _load(item_of(use.value, 2)))
 
     def base(self, use: FrameUse, line: int) -> int | Problem:
         """Index of a work object: user frame x object frame; or why it is not known."""
@@ -99,9 +101,18 @@ class ModuleFrames(FrameTable):
             return reason + "".join(f"; the cell has the symbol {name}" for name in close)
         return reason
 
-    def _posed(self, kind: str, pose: Poses, line: int) -> int:
-        key = (kind, *pose.position.tolist(), *pose.rotation.ravel().tolist())
-        return self.index(key, lambda: FrameRef(None, pose, line))
+    def _posed(self, kind: str, pose: Poses, line: int, load: Load | None = None) -> int:
+        key = (kind, load, *pose.position.tolist(), *pose.rotation.ravel().tolist())
+        return self.index(key, lambda: FrameRef(None, pose, line, load=load))
+
+
+def _load(value: Value) -> Load | None:
+    """Mass [kg] and centre [m] of the load data of a tool; None where they are not known."""
+    mass, centre = number_of(item_of(value, 0)), numbers_of(item_of(value, 1), 3)
+    if mass is None or centre is None:
+        return None
+    x, y, z = centre
+    return float(mass), x * MM, y * MM, z * MM
 
 
 def _pose(value: Value) -> Poses | None:

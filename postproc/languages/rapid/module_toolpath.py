@@ -25,6 +25,7 @@ from postproc.languages.core.row_facts import (
     only_used,
 )
 from postproc.languages.core.waits import Waits
+from postproc.languages.rapid.grip_loads import grip_loads
 from postproc.languages.rapid.module_frames import ModuleFrames
 from postproc.languages.rapid.module_rows import ModuleRows, module_rows
 from postproc.languages.rapid.propagation import Propagation
@@ -81,7 +82,7 @@ def module_toolpath(
             external=rows.external,
         ),
         line=rows.lines,
-        speeds=MotionSpeeds(rows.per_row([fact.speed * MM for fact in facts], float)),
+        speeds=MotionSpeeds(_speeds(rows, flow.refreshed)),
         sequence=MotionSequence(
             approximation=zone,
             stops=stops,
@@ -103,6 +104,7 @@ def module_toolpath(
         ),
         configuration=Configuration({"quadrants": rows.quadrants, "cfx": rows.cfx}),
         remarks=remarks,
+        stated_loads=grip_loads(document),
     )
     toolpath = only_used(toolpath)
     single = np.flatnonzero(~rows.texts.is_plain(np.arange(n)))
@@ -113,6 +115,24 @@ def module_toolpath(
     if moving is not None:
         findings.append(_finding(document, rows, moving[0], "RAP022", moving[1]))
     return toolpath, places, findings
+
+
+def _speeds(rows: ModuleRows, refreshed: set[Source]) -> Floats:
+    """(N,) [m/s], NaN where it is not known: for motions back to the last stop too, where speeds are changed at once
+    after them.  refreshed: offsets of motions after which they are."""
+    speeds: Floats = rows.per_row([fact.speed * MM for fact in rows.facts], float)
+    meetings: set[Meeting] = set()
+    pending, done = rows.rows_of(refreshed, meetings), set()
+    while pending:
+        row = pending.pop()
+        fact = rows.fact(row)
+        if row in done or fact.stops:
+            continue
+        done.add(row)
+        speeds[row] = np.nan
+        if fact.waits != Waits.YES or row != rows.first[rows.fact_of[row]]:
+            pending += rows.starts_of(row, meetings)
+    return speeds
 
 
 def _zones(rows: ModuleRows, continues: Bools, waited: set[Source]) -> tuple[Floats, Bools]:

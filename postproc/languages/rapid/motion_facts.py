@@ -34,6 +34,8 @@ from postproc.languages.rapid.values import (
 from postproc.toolpath import ArcFrame, Kind, OrientationMode
 
 NAN = math.nan
+LIMIT = 5000.0
+"""[mm/s] that VelSet has as the largest speed where nothing else is stated: faster motions may be limited."""
 DIFFERS = "it has different values in several executions of its line"
 
 Problem = tuple[str, str]
@@ -174,7 +176,7 @@ def override_of(arguments: tuple[Argument, ...], evaluator: Evaluator) -> float 
     """The factor of VelSet; a limit below usual speeds makes it unknown."""
     values = [evaluator.value(a.value) for a in arguments if a.value is not None]
     numbers = [number_of(value) for value in values]
-    if len(numbers) != 2 or numbers[0] is None or numbers[1] is None or numbers[1] < 5000:
+    if len(numbers) != 2 or numbers[0] is None or numbers[1] is None or numbers[1] < LIMIT:
         return None
     return numbers[0] / 100.0
 
@@ -216,14 +218,14 @@ def _frame(argument: Argument, evaluator: Evaluator) -> FrameUse:
 
 def _speed(arguments: MotionArguments, form: MotionForm, state: ProgramState, evaluator: Evaluator) -> float:
     """[mm/s] of the TCP; NaN where it follows from a time, a process, or is not known."""
-    if not form.feed or b"T" in arguments.options or state.override is None:
+    if not form.feed or b"T" in arguments.options or state.override is None or state.scaled:
         return NAN
     own = switch_value(arguments.options.get(b"V"))
     if own is not None:
         value = number_of(evaluator.value(own))
     else:
         value = number_of(first_of(_value(arguments.speed, evaluator)))
-    return NAN if value is None or not 0 < value < 1e6 else value * state.override
+    return NAN if value is None or not 0 < value <= LIMIT else value * state.override
 
 
 def _zone(arguments: MotionArguments, evaluator: Evaluator) -> tuple[float, bool]:

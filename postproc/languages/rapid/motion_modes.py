@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from postproc.languages.rapid.evaluation import Evaluator
+from postproc.languages.rapid.instructions import SCALING
 from postproc.languages.rapid.motion_facts import override_of
 from postproc.languages.rapid.program_state import ProgramState
 from postproc.languages.rapid.syntax_tree import Instruction
 from postproc.toolpath import ArcFrame, OrientationMode
 
-MODES_OF_MOTIONS = frozenset([b"CONFL", b"CONFJ", b"SINGAREA", b"CIRPATHMODE", b"SPEEDREFRESH", b"VELSET"])
+MODES_OF_MOTIONS = SCALING | {b"CONFL", b"CONFJ", b"SINGAREA", b"CIRPATHMODE", b"VELSET"}
 
 
 def set_mode(step: Instruction, state: ProgramState, evaluator: Evaluator) -> None:
@@ -25,7 +26,7 @@ def set_mode(step: Instruction, state: ProgramState, evaluator: Evaluator) -> No
         case b"CIRPATHMODE":
             arcs = {frozenset([b"PATHFRAME"]): ArcFrame.PATH, frozenset([b"OBJECTFRAME"]): ArcFrame.BASE}
             state.arc = arcs.get(options, ArcFrame.UNKNOWN)
-        case b"SPEEDREFRESH":
-            state.override = None
         case b"VELSET":
             state.override = override_of(step.arguments, evaluator)
+        case _:
+            state.scaled = True

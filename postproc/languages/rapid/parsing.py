@@ -180,9 +180,12 @@ class ModuleParser(RapidExpressionParser):
 
     def _parameters(self) -> tuple[RoutineParameter, ...]:
         found: list[RoutineParameter] = []
+        optional = either = False
         self.need(b"(")
         while not self.sign(b")"):
-            optional = self.sign(b"\\")
+            optional = self.sign(b"\\") or (
+                optional and either
+            )  # one backslash is before all that exclude each other
             mode = self.take().text if self._word() in (b"INOUT", b"VAR", b"PERS") else b""
             if self._word() == b"SWITCH":
                 self.take()
@@ -195,9 +198,15 @@ class ModuleParser(RapidExpressionParser):
                         self.need(b"*")
                         self.sign(b",")
                 found.append(RoutineParameter(mode, kind, name, optional))
-            if self.sign(b"|"):
+            either = self.sign(b"|")
+            if either and (not optional or self.next.kind != NAME):
                 raise SyntaxProblem
-            if not self.sign(b",") and not (self.next.text == b"\\") and self.next.text != b")":
+            if (
+                not either
+                and not self.sign(b",")
+                and not (self.next.text == b"\\")
+                and self.next.text != b")"
+            ):
                 raise SyntaxProblem
         return tuple(found)
 

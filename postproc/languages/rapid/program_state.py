@@ -21,15 +21,17 @@ class _ValuesDiffer(Exception):
 @dataclass(slots=True)
 class ProgramState:
     """``values``: of variables that are assigned anywhere; ``last``: offsets of the motions after which the robot is
-    here.  ``displaced``: instructions in force that displace targets; ``override``: factor of speeds, None where it is
-    not known; ``orientation``: OrientationMode by SingArea; ``arc``: ArcFrame by CirPathMode.  ``force``, ``switch``:
-    the FORCE and COMPENSATE comments in force; ``concurrent``: the program may go on while the last motion runs.
+    here.  ``displaced``: instructions in force that displace targets; ``override``: factor of speeds by VelSet, None
+    where it is not known; ``scaled``: something else may scale or limit them; ``orientation``: OrientationMode by
+    SingArea; ``arc``: ArcFrame by CirPathMode.  ``force``, ``switch``: the FORCE and COMPENSATE comments in force;
+    ``concurrent``: the program may go on while the last motion runs.
     """
 
     values: PersistentMap = field(default_factory=lambda: PersistentMap(KeyNumbers()))
     last: frozenset[Source] = frozenset([START])
     displaced: frozenset[bytes] = frozenset()
     override: float | None = 1.0
+    scaled: bool = False
     orientation: OrientationMode = OrientationMode.VAR
     arc: ArcFrame = ArcFrame.PATH
     force: Remark | Varying | None = None
@@ -41,7 +43,7 @@ class ProgramState:
 
     def copy(self) -> ProgramState:
         return ProgramState(
-            self.values, self.last, self.displaced, self.override, self.orientation, self.arc, self.force,
+            self.values, self.last, self.displaced, self.override, self.scaled, self.orientation, self.arc, self.force,
             self.switch, self.checks_linear, self.checks_joint, self.waits, self.concurrent,
         )  # fmt: skip
 
@@ -93,6 +95,7 @@ _JOINS = FieldJoins(
     {
         "displaced": frozenset.union,
         "override": lost(None),
+        "scaled": either,
         "orientation": lost(OrientationMode.UNKNOWN),
         "arc": lost(ArcFrame.UNKNOWN),
         "force": join_comments,

@@ -14,11 +14,13 @@ from postproc.languages.core.flow_runner import FlowRunner
 from postproc.languages.core.motion_sources import ELSEWHERE, START, Meeting, Source
 from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.core.waits import Waits
+from postproc.languages.rapid.call_arguments import give_arguments, given_back
 from postproc.languages.rapid.call_effects import CallEffects, ModeChanges, leaving_words, mode_changes
 from postproc.languages.rapid.declared_data import DeclaredData, Usage, first_value, names_in
 from postproc.languages.rapid.evaluation import Evaluator, is_component, unknown_record
 from postproc.languages.rapid.instructions import (
     ANY_PROCEDURE,
+    AT_ONCE,
     DISPLACING,
     HARMLESS,
     MOTIONS,
@@ -26,6 +28,7 @@ from postproc.languages.rapid.instructions import (
     PURE,
     READERS,
     RESTORING,
+    SCALING,
     WRITERS,
     MotionForm,
     is_motion,
@@ -50,7 +53,7 @@ from postproc.languages.rapid.syntax_tree import (
     RapidRoutine,
     Remark,
 )
-from postproc.languages.rapid.values import UnknownData, Value, plain, replaced, truth_of
+from postproc.languages.rapid.values import UnknownData, Value, replaced, truth_of
 from postproc.toolpath import Kind
 
 OTHER = MotionForm(Kind.OTHER)
@@ -65,8 +68,8 @@ UNSETTLED = ProgramState()
 
 
 class Propagation:
-    """Runs a module.  ``facts``, ``passed``, ``calls``, ``reads``: as of a RunRecord; ``unread``: statements that are
-    not understood; ``preceding``: the comment in force before each, VARYING where several may."""
+    """Runs a module.  ``facts``, ``passed``, ``calls``, ``reads``, ``refreshed``: as of a RunRecord; ``unread``:
+    statements that are not understood; ``preceding``: the comment in force before each, VARYING where several may."""
 
     def __init__(self, module: Module, raw: bytes) -> None:
         self.module = module
@@ -79,9 +82,9 @@ class Propagation:
         functions = frozenset(r.name for r in module.routines if r.kind == b"FUNC")
         self.data = DeclaredData(module, functions, raw)
         self.usage = Usage(module)
-        self._record = RunRecord()
-        self.facts, self.passed = self._record.facts, self._record.passed
-        self.calls, self.reads = self._record.calls, self._record.reads
+        record = self._record = RunRecord()
+        self.facts, self.passed, self.calls = record.facts, record.passed, record.calls
+        self.reads, self.refreshed = record.reads, record.refreshed
         self.unread: dict[int, NotUnderstood] = {}
         self._strayed = frozenset([ELSEWHERE] if self.usage.strays else [])
         self._again: set[bytes] = set()  # routines of which not each run is followed
@@ -129,8 +132,10 @@ class Propagation:
                 state.put(name, value_at_start(self.data, name, is_main))
         if is_aside:
             mode_changes(one.body for one in self.module.routines).lose(state, b"its caller")
-        if self._aside:
+        if self._aside.names - SCALING or self._aside.speaks:
             state.displaced |= {b"a trap or an error handler"}
+        if self._aside.names & SCALING:  # at any time
+            state.scaled = True
         if not is_main or (end := self._start_again(routine, state)) is UNSETTLED:
             self._start()
             end = self._routine(routine, state, True)
@@ -312,6 +317,8 @@ class Propagation:
             state.displaced -= frozenset(RESTORING[name])
         elif name in MODES_OF_MOTIONS:
             set_mode(step, state, self._evaluator(state))
+            if name in AT_ONCE and self._runner.recording and state.waits != Waits.YES:
+                self.refreshed |= state.last
         elif name in WRITERS:
             self._change(step.arguments, state)
         elif name not in HARMLESS and name not in (b"ACTUNIT", b"DEACTUNIT"):
@@ -353,9 +360,12 @@ class Propagation:
             self._forget(name, state, "an instruction or a call may change it")
 
     def _forget(self, name: bytes, state: ProgramState, reason: str) -> None:
+        self._put(name, UnknownData(f"{name.decode('latin-1')}: {reason}"), state)
+
+    def _put(self, name: bytes, value: Value, state: ProgramState) -> None:
         key = self._names.key(name)
         if key != name or (name in self.data and not self.data.is_constant(name)):
-            state.put(key, UnknownData(f"{name.decode('latin-1')}: {reason}"))
+            state.put(key, value)
 
     def _call(self, routine: RapidRoutine, step: Instruction, state: ProgramState) -> None:
         """Runs a routine of the file with its arguments."""
@@ -372,22 +382,9 @@ class Propagation:
             self._lose_effects(routine.name, state)
             self._change(step.arguments, state)
         evaluator = self._evaluator(state)
-        required = [argument for argument in step.arguments if not argument.name]
-        named = {argument.name: argument for argument in step.arguments if argument.name}
-        shared: list[tuple[bytes, Argument]] = []
         changed = self._effects.of(routine.name).assigned
         inner = state.copy()
-        for parameter in routine.parameters:
-            argument = named.get(parameter.name)
-            if not parameter.optional and required:
-                argument = required.pop(0)
-            key = routine.name + b"/" + parameter.name
-            value: Value = UnknownData(f"{parameter.name.decode('latin-1')} is not given")
-            if argument is not None and argument.value is not None:
-                value = plain(evaluator.value(argument.value))
-            inner.put(key, value)
-            if parameter.mode and argument is not None:
-                shared.append((parameter.name, argument))
+        shared = give_arguments(routine, step, evaluator, inner)
         pairs = [(parameter, names_in((one,))) for parameter, one in shared]
         self._names.find_aliases(routine, pairs, self._effects.of(routine.name))
         after = self._routine(routine, inner, self._runner.recording)
@@ -398,6 +395,9 @@ class Propagation:
         displaced = state.displaced
         state.take(after)
         self._change(tuple(argument for name, argument in shared if name in changed), state)
+        if not routine.handlers and b"TRYNEXT" not in resumes:
+            for name, value in given_back(routine, shared, changed, after):
+                self._put(name, value, state)
         if routine.handlers or b"TRYNEXT" in resumes:
             self._lose_effects(routine.name, state)
             state.displaced |= displaced

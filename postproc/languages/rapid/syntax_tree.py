@@ -199,6 +199,11 @@ def loop_names(depth: int) -> tuple[bytes, bytes]:
     return b"last of %d" % depth, b"step of %d" % depth
 
 
+def presence_name(parameter: bytes) -> bytes:
+    """What no program can name either: whether a call gives an optional ``parameter``."""
+    return b"presence of " + parameter
+
+
 @dataclass(frozen=True, slots=True)
 class While:
     condition: Expression

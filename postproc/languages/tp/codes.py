@@ -74,7 +74,8 @@ CODES = define(
         "FTP010": warning(
             "call of another program",
             "The called program may move the robot and select frames.",
-            "The position and the selected frames are unknown after the call; those of the points are taken.",
+            "The position and the selected frames are unknown after the call; those of the points are taken."
+            " Speeds (OVERRIDE) and displacements are assumed unchanged.",
             "Check what the program does.",
             "`CALL TOOL_CHANGE(4) ;`.",
         ),

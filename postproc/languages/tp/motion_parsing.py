@@ -34,6 +34,7 @@ _ALTERING = re.compile(rb"CALL[ \t]++(?P<called>[A-Z_][A-Z0-9_]*+)|POINT_LOGIC|A
 _CARRIED = re.compile(
     rb"[ \t]*+(?:ACC[ \t]*+(?:[0-9]++|A?+R" + _REGISTER + rb")|PTH|PSPD[ \t]*+[0-9]++)(?![A-Z0-9_.])", re.I
 )
+_PACE = re.compile(rb"PSPD[ \t]*+([0-9]++)", re.I)
 _WRIST = re.compile(rb"[ \t]*+Wjnt\b", re.I)
 _OWN = re.compile(
     rb"[ \t]*+(?:(?:TB|TA)[ \t]*+[0-9]*+\.?+[0-9]*+[ \t]*+sec[ \t]*+,[ \t]*+(?P<at_time>" + _ACTION
@@ -64,6 +65,7 @@ class _Options:
     own: bool = False
     alters: bool = False
     called: str = ""
+    paced: bool = False
     relative: bool = False
     wrist: bool = False
     problem: tuple[str, str] | None = None
@@ -105,7 +107,7 @@ def parse_motion(text: bytes) -> TpMove | None:
     return TpMove(
         form, tuple(points), shown, value, unit, termination, corner[:2], b" ".join(options.carried), options.own,
         options.wrist, problem, options.skip, head.span(1), options.alters, options.relative,
-        options.called,
+        options.called, options.paced,
     )  # fmt: skip
 
 
@@ -162,6 +164,8 @@ def _read_options(text: bytes, at: int, options: _Options) -> int:
         found = _CARRIED.match(text, after)
         if found is not None:
             options.carried.append(found[0].strip())
+            pace = _PACE.fullmatch(options.carried[-1])
+            options.paced |= pace is not None and int(pace[1]) != 100
         elif (found := _WRIST.match(text, after)) is not None:
             options.wrist = True
             options.carried.append(found[0].strip())

@@ -27,6 +27,7 @@ from postproc.languages.tp.tp_statements import (
     RegisterAssignment,
     RegisterExpression,
     RegisterOperand,
+    SpeedChange,
     StatementNotRead,
     TimeoutStatement,
     TpRemark,
@@ -70,13 +71,19 @@ _FOR = re.compile(
     rb"FOR[ \t]++R\[[ \t]*+([0-9]{1,9}+)[^\]]*+\][ \t]*+=.*[ \t](?:TO|DOWNTO)[ \t].*", re.I | re.S
 )
 _TIMEOUT = re.compile(
-    rb"WAIT\b.*\bTIMEOUT[ \t]*+,[ \t]*+LBL[ \t]*+\[[ \t]*+(?:([0-9]{1,9}+)(?![0-9]))?+.*", re.I | re.S
+    rb"(?:WAIT\b.*\bTIMEOUT[ \t]*+,|VISION[ \t]++GET_OFFSET\b.*\bJMP[ \t]*+,?+)[ \t]*+LBL[ \t]*+\[[ \t]*+"
+    rb"(?:([0-9]{1,9}+)(?![0-9]))?+.*",
+    re.I | re.S,
 )
+"""A WAIT whose time is over, and a vision process that finds nothing, go on at a label."""
 _OVERRIDE = re.compile(
-    rb"OVERRIDE[ \t]*+=[ \t]*+(?:([0-9]{1,9}+)[ \t]*+%|A?+R\[[^\]]*+\](?:[ \t]*+%)?+)", re.I
+    rb"(?:OVERRIDE|\$MCR[ \t]*+\.[ \t]*+\$GENOVERRIDE)[ \t]*+=[ \t]*+(?:([0-9]{1,9}+)(?![0-9.])[ \t]*+%?+|.*)",
+    re.I | re.S,
 )
+"""OVERRIDE= sets the system variable $MCR.$GENOVERRIDE, which a program may assign as well."""
 _LIMIT = re.compile(rb"(?:JOINT|LINEAR)_MAX_SPEED\b.*", re.I | re.S)
 _POINT_READ = re.compile(rb"(?<![A-Z])P[ \t]*+\[[ \t]*+(?:([0-9]{1,9}+)(?![0-9]))?+", re.I)
+_MAY_SLOW = re.compile(rb"\$|SPEED|SPD|OVERRIDE|OVRD", re.I)
 _PLACE = re.compile(rb"\b[LJC]POS\b", re.I)
 _STARTS = re.compile(
     rb"(Weave|Track|Touch[ \t]++Offset|Search[ \t]++Start|SOFTFLOAT|MIG[ \t]++EYE|LINE|FORCE[ \t]++CTRL)\b.*",
@@ -93,16 +100,18 @@ _WAIT = re.compile(
     rb"PAUSE|WAIT[ \t]*+((?:[0-9]{1,9}+(?:\.[0-9]{0,9}+)?+|\.[0-9]{1,9}+))[ \t]*+(?:\([ \t]*+sec[ \t]*+\))?+",
     re.I,
 )
-_WAIT_FOR = re.compile(rb"WAIT\b", re.I)
+_WAIT_FOR = re.compile(rb"WAIT\b|UALM[ \t]*+\[", re.I)
+"""What may wait; a user alarm (UALM) pauses the program or not, by a setting of the controller."""
 SHORTEST_WAIT_S = 0.2
 """A WAIT of as much is not over when the robot, which the program is ahead of, is in the corner."""
 _OTHER = re.compile(
     rb"(?:(?:DO|RO|GO|AO|SO|UO|WO|F|M|SR|AR|DI|RI|GI|AI|TIMER|ENC|VR|PL)[ \t]*+\[.*\][ \t]*+=.*"
-    rb"|MESSAGE[ \t]*+\[.*|UALM[ \t]*+\[.*|PAYLOAD\b.*"
+    rb"|MESSAGE[ \t]*+\[.*|PAYLOAD\b.*"
     rb"|COL[ \t]++(?:DETECT|GUARD).*|(?:Arc|Weld)[ \t]++(?:Start|End|Stabilize).*|SPOT\[.*"
     rb"|(?:TOOL_)?+OFFSET[ \t]++CONDITION.*|VOFFSET[ \t]++CONDITION.*|SKIP[ \t]++CONDITION.*"
+    rb"|VISION[ \t]++(?:RUN_FIND|SET_REFERENCE|GET_OFFSET)\b.*|TC_ONLINE\b.*|MONITOR[ \t]++END\b.*"
     rb"|(?:UN)?+LOCK[ \t]++PREG|RSR\[.*|DIAG_REC\[.*|PRINT\b.*|STRLEN\b.*|Sample[ \t]++(?:Start|End).*"
-    rb"|\$(?:WAITTMOUT|WAITRELEASE|MCR\.\$GENOVERRIDE|RMT_MASTER)[ \t]*+=.*)",
+    rb"|\$(?:WAITTMOUT|WAITRELEASE|RMT_MASTER)[ \t]*+=.*)",
     re.I | re.S,
 )
 
@@ -192,7 +201,7 @@ def _parse_settings(text: bytes) -> TpStatement:
     if (found := _OVERRIDE.fullmatch(text)) is not None:
         return OverrideStatement(None if found[1] is None else float(found[1]))
     if _LIMIT.fullmatch(text):
-        return OverrideStatement(None)
+        return SpeedChange()
     if (found := _STOPS.fullmatch(text)) is not None:
         return DisplacementSwitch(_name(found[1] or found[2]), False)
     if (found := _STARTS.fullmatch(text)) is not None:
@@ -204,7 +213,9 @@ def _parse_settings(text: bytes) -> TpStatement:
     return (
         OtherStatement()
         if _OTHER.fullmatch(text)
-        else StatementNotRead(_MAY_DISPLACE.search(text) is not None)
+        else StatementNotRead(
+            displaces=_MAY_DISPLACE.search(text) is not None, slows=_MAY_SLOW.search(text) is not None
+        )
     )
 
 

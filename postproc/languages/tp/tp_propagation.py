@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from postproc.languages.core.comments_in_force import Varying, join_comments, place_of
-from postproc.languages.core.field_joins import FieldJoins, lost
+from postproc.languages.core.field_joins import FieldJoins, either, lost
 from postproc.languages.core.flow_runner import FlowRunner
 from postproc.languages.core.motion_sources import ELSEWHERE, START, Meeting, Source, met
 from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
@@ -28,6 +28,7 @@ from postproc.languages.tp.tp_statements import (
     RegisterAssignment,
     RegisterExpression,
     RegisterOperand,
+    SpeedChange,
     StatementNotRead,
     TimeoutStatement,
     TpMove,
@@ -46,13 +47,15 @@ NO_REGISTERS = PersistentMap(KeyNumbers())
 class TpState:
     """``base``, ``tool``: the selected numbers, None where they are not known; ``registers``: number -> value of those
     that are known, the same object where another path adds nothing; ``displaced``: what displaces targets;
-    ``override``: factor of speeds, None where it is not known."""
+    ``override``: factor of speeds, None where it is not known; ``slowed``: what OVERRIDE does not end may change them
+    as well."""
 
     base: int | None = None
     tool: int | None = None
     registers: PersistentMap = NO_REGISTERS
     displaced: frozenset[bytes] = frozenset()
     override: float | None = 1.0
+    slowed: bool = False
     force: Said = None
     switch: Said = None
 
@@ -102,6 +105,7 @@ _JOINS = FieldJoins(
         "registers": PersistentMap.common,
         "displaced": frozenset.union,
         "override": lost(None),
+        "slowed": either,
         "force": join_comments,
         "switch": join_comments,
     }
@@ -247,6 +251,8 @@ class TpPropagation:
                 return state if one.register is None else state.with_register(one.register, None)
             case OverrideStatement():
                 return replace(state, override=None if one.percent is None else one.percent / 100.0)
+            case SpeedChange():
+                return replace(state, slowed=True)
             case DisplacementSwitch():
                 changed = state.displaced | {one.name} if one.starts else state.displaced - {one.name}
                 return replace(state, displaced=frozenset(changed))
@@ -254,7 +260,9 @@ class TpPropagation:
                 return _nothing_set(state)
             case StatementNotRead():
                 lost = state.displaced | ({b"a statement that is not understood"} if one.displaces else set())
-                state = replace(state, override=None, displaced=frozenset(lost))
+                state = replace(
+                    state, override=None, slowed=state.slowed or one.slows, displaced=frozenset(lost)
+                )
                 return _nothing_set(state)
         return state
 

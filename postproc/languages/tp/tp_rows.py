@@ -195,14 +195,7 @@ class RowBuilder:
             rows.targets[row] = numbers[-1]
             rows.middles[row] = numbers[0] if move.form == b"C" else -1
             kind = {b"J": Kind.PTP, b"L": Kind.LIN}.get(move.form, Kind.CIRC)
-            if (
-                state is not None
-                and move.unit in (b"mm/sec", b"cm/min", b"inch/min")
-                and state.override is not None
-            ):
-                speed = state.value(move.value)
-                if speed is not None and 0 < speed < 1e6:
-                    rows.feed[row] = speed * state.override
+            rows.feed[row] = _feed(move, state)
             group = self._target(row, move, numbers[-1])
             if group is not None:
                 rows.base[row] = self._frame(row, group, False, state)
@@ -304,7 +297,8 @@ class RowBuilder:
         if found is None or found[0] & 4:
             if kind == Kind.PTP:
                 shown = "" if group.config is None else group.config.decode("latin-1")[:30]
-                rows.refuse(row, "FTP004", f"its configuration {shown!r} is none that is read")
+                why = "none that is read" if found is None else "with B, for which no joints are computed"
+                rows.refuse(row, "FTP004", f"its configuration {shown!r} is {why}")
                 rows.numbers[row] = np.nan
             return -1, -1
         packed = 0
@@ -322,6 +316,14 @@ class RowBuilder:
             external[np.isnan(external) & stated] = LOST
         else:
             self.rows.external = np.broadcast_to(np.nan, external.shape)
+
+
+def _feed(move: TpMove, state: TpState | None) -> float:
+    """[mm/s] of the TCP; NaN where it is not known, or follows from a time or from axes."""
+    if state is None or state.override is None or state.slowed or move.paced:
+        return np.nan
+    speed = state.value(move.value) if move.unit in (b"mm/sec", b"cm/min", b"inch/min") else None
+    return np.nan if speed is None or not 0 < speed < 1e6 else speed * state.override
 
 
 def _rows(run: TpPropagation) -> TpRows:

@@ -47,7 +47,7 @@ class TpMove:
     ``wrist``: Wjnt; ``problem``: code and reason for which it is not corrected; ``skip``: label to which it may lead.
     ``head``: start and stop of the letter of its form in the text of the statement; ``alters``: what it does beside
     its path (TB, TA, DB) may set registers; ``relative``: its target counts from where the robot is (INC);
-    ``called``: the program that it calls beside its path.
+    ``called``: the program that it calls beside its path; ``paced``: an option changes its speed (PSPD).
     """
 
     form: bytes
@@ -66,6 +66,7 @@ class TpMove:
     alters: bool = False
     relative: bool = False
     called: str = ""
+    paced: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,9 +179,14 @@ class PositionUse:
 
 @dataclass(frozen=True, slots=True)
 class OverrideStatement:
-    """OVERRIDE=n%; a limit of the speed has None."""
+    """OVERRIDE=n%, None where the number is not known."""
 
     percent: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedChange:
+    """What changes speeds beside OVERRIDE, which does not end it: a limit, or another factor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,10 +205,11 @@ class OtherStatement:
 @dataclass(frozen=True, slots=True)
 class StatementNotRead:
     """A statement that is not understood.  ``displaces``: it may displace the targets after it; ``moves``: it starts as
-    a motion does."""
+    a motion does; ``slows``: it may change speeds in a manner that OVERRIDE does not end."""
 
     displaces: bool = False
     moves: bool = False
+    slows: bool = False
 
 
 TpStatement = (
@@ -224,6 +231,7 @@ TpStatement = (
     | RegisterAssignment
     | PositionUse
     | OverrideStatement
+    | SpeedChange
     | DisplacementSwitch
     | OtherStatement
     | StatementNotRead

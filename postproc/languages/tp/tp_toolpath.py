@@ -21,6 +21,7 @@ from postproc.languages.core.row_facts import (
     moving_external,
     only_used,
 )
+from postproc.languages.tp.payload_schedules import payload_schedules
 from postproc.languages.tp.tp_arcs import arcs_of
 from postproc.languages.tp.tp_listing import TpListing
 from postproc.languages.tp.tp_propagation import TpPropagation
@@ -89,6 +90,7 @@ def toolpath_of(
         ),
         configuration=Configuration({"nut": rows.nut, "revolutions": rows.revolutions}),
         remarks=remarks,
+        stated_loads=payload_schedules(document),
     )
     findings += grouped(refused, path.line)
     moving = moving_external(rows.external)

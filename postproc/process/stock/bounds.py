@@ -29,6 +29,7 @@ from postproc.process.stock.distance import (
     ROUND,
     STRAIGHT,
     TAPER,
+    Triple,
     axis_at,
     cutter_distance,
     swept_distance,
@@ -161,10 +162,18 @@ def convex_distance(
 
 @compiled
 def set_plane(
-    bounds: Floats, cutters: Floats, j: int, x: float, y: float, z: float, half: float, plane: Singles
+    bounds: Floats,
+    cutters: Floats,
+    j: int,
+    point: Triple,
+    half: float,
+    slack: float,
+    plane: Singles,
 ) -> None:
-    """``plane`` (PLANE_COLUMNS,) of sweep ``j`` within ``half`` [m] of the middle [m] of a cell; bounds (M,
-    BOUND_COLUMNS), cutters (T, 6)."""
+    """``plane`` (PLANE_COLUMNS,) of sweep ``j``, or of what it is where it is displaced by ``slack`` [m] at most,
+    within ``half`` [m] of the middle ``point`` [m] of a cell; bounds (M, BOUND_COLUMNS), cutters (T, 6)."""
+    x, y, z = point
+    half += slack  # a point as far from a displaced sweep is within so much more of this one
     plane[:] = 0.0
     plane[0] = NO_PLANE
     if bounds[j, _KIND] != 1.0:
@@ -180,5 +189,5 @@ def set_plane(
     size = np.sqrt(ux * ux + uy * uy + uz * uz)
     if above >= 0.0 or -above <= far * bounds[j, _HALF_TURN] or size < half:
         return
-    plane[0] = size - cutters[int(bounds[j, _CUTTER]), RADIUS] - bounds[j, _OFF] - _SINGLE
+    plane[0] = size - cutters[int(bounds[j, _CUTTER]), RADIUS] - bounds[j, _OFF] - slack - _SINGLE
     plane[1], plane[2], plane[3] = ux / size, uy / size, uz / size

@@ -89,7 +89,7 @@ def build_stock(
     first = np.zeros(cells + 1, np.int64)
     np.cumsum(count, out=first[1:])
     entries = max(int(first[-1]), 1)
-    bounded = entries if len(bounds) and slack == 0.0 else 0
+    bounded = entries if len(bounds) else 0
     check_memory(len(sweeps), cells, entries, bounded)
     near, stop = (np.zeros(entries, np.int32) for _ in range(2))
     planes = np.zeros((PLANE_COLUMNS, bounded), np.float32)
@@ -315,7 +315,8 @@ def _list(
                             near[count[cell]] = m
                             stop[count[cell]] = near_last if slack == 0.0 else m
                             if planes.shape[1]:
-                                set_plane(stock.bounds, cutters, m, x, y, z, half, planes[:, count[cell]])
+                                plane = planes[:, count[cell]]
+                                set_plane(stock.bounds, cutters, m, (x, y, z), half, slack, plane)
                             count[cell] += 1
                         continue
                     for m in range(near_first, near_last + 1):

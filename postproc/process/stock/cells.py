@@ -35,9 +35,8 @@ class Stock(NamedTuple):
     blank: see ``Blank``; sweeps (M, ROW), cutters (T, 6): see ``distance``; grid (5,): size [m] of the cells, how far
     distances are known [m], and the numbers of cells from the blank's lowest corner; first (C + 1,) and near
     (E,): the sweeps that come that near to each cell, ascending; stop (E,): the last of the sweeps from that of
-    ``near`` on that go on in one line and are near.  bounds (M, B): of the sweeps, B columns, or of
-    none; whoever changes a sweep sets its bound again.  planes (4, E): of the entries of ``near``, or of none where
-    sweeps may be displaced.
+    ``near`` on that go on in one line and are near.  bounds (M, B): of the sweeps, B columns, or of none; whoever
+    changes a sweep sets its bound again.  planes (4, E): of the entries of ``near``, or of none without bounds.
     """
 
     blank: Blank
@@ -138,6 +137,11 @@ def nearest_line(
             best, owner, end = d, first, last
             if best <= -reach or (depth == 0.0 and best < -_DEEP * reach):
                 return max(best, -reach), owner, end
+        close, enough_single = 0, np.float32(max(best, depth))
+        for entry in range(len(least)):
+            close += least[entry] + ux[entry] * dx + uy[entry] * dy + uz[entry] * dz <= enough_single
+        if close <= 1:
+            return best, owner, end
     for entry in range(len(near) - 1, -1, -1):
         # on the positive side only a smaller distance counts
         enough = max(best, depth)

@@ -275,5 +275,33 @@ CODES = define(
             action="Compare the top of the blank with the zero point of the program.",
             example="`box: [[0, 0, -30], [120, 80, 2]]` for a top at Z 0, and levels at Z -2, -4, -6.",
         ),
+        "STK034": Code(
+            "warning",
+            "motions that cut may not run once in the order of their lines",
+            meaning="The program branches, repeats or calls a routine of another file, and what is cut before this"
+            " motion depends on that.",
+            consequence="From there on engagement and forces are those of a stock that all motions cut once, in the"
+            " order of their lines.",
+            action="Give each branch a program of its own, or state its forces in FORCE comments.",
+            example="A slot in IF $IN[1] and one beside it in ELSE: only one of them is cut.",
+        ),
+        "STK035": Code(
+            "error",
+            "part turns and its stock does not",
+            meaning="Rotary words turn the part (rotary_words: part), and where their axes are is not stated.",
+            consequence="Nothing is simulated and nothing is written: the tool would cut the stock at another side.",
+            action="Give each position of the table a program of its own, with a stock of its own: a blank as it lies"
+            " then.",
+            example="A slot at C0, then the same words at C180.",
+        ),
+        "STK036": Code(
+            "error",
+            "base of the stock is not certain",
+            meaning="The stock file was cut in another base, or the first cut is in another base wherever the"
+            " blank is placed.",
+            consequence="Nothing is simulated and nothing is written: the blank may lie elsewhere.",
+            action="State in which base the stock lies: base: N in stock.",
+            example="`stock: {from: rough.stock}` in base 1 for a program that cuts in base 2.",
+        ),
     }
 )

@@ -1,20 +1,19 @@
-"""What a process file states of tools, blank and coefficients that the program, or the cell, contradicts.
+"""What a process file states of tools and blank that the cut, the path in the blank, or the cell contradicts.
 
-A length in inches, centimetres or metres, a radius for a diameter, a speed in another unit: each goes through every
-check of a file for itself, and the forces and the correction are wrong by as much.  Nothing is guessed and nothing
-changed: every contradiction is a warning that names both sides.
+What needs no blank is checked as it is without one: see ``cut_checks``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
 
 import numpy as np
 
-from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.arrays import Bools, Floats
 from postproc.base.findings import Finding
-from postproc.base.units import DEG, MM
+from postproc.base.units import MM
+from postproc.cell import MotionFrames
+from postproc.process.cut_checks import CheckCodes, CheckedCut, wrong_forces, wrong_sizes
 from postproc.process.stock.blank import corners_of
 from postproc.process.stock.cutters import Cutter
 from postproc.process.stock.distance import AXIS, CUTTER, REMOVES, STEP, TIP_POINT, TURN
@@ -23,89 +22,77 @@ from postproc.process.stock.motion_sweeps import MotionSweeps
 from postproc.process.stock.stock_section import StockProcess
 from postproc.toolpath import Toolpath
 
-SAME_DIAMETER = 0.01
-THINNEST, THICKEST = 1.0 * MM, 200.0 * MM
-"""Diameters of the cutters of robots."""
-DEEPEST_SLOT, DEEPEST = 4.0, 12.0
-"""Diameters: of a cut that is at least half as wide as the tool, and of any, but for drills."""
-_WIDE = 0.5
-LEAST_HELIX = 2.0 * DEG
-FASTEST = 5000.0 / 60
-"""[m/s] of the edges: nothing is cut faster."""
-FASTEST_TURN, TURNS_FAST = 60000 * 2 * np.pi / 60, 10.0 * MM
-"""[rad/s] of a spindle that takes cutters above that diameter."""
-FINEST_PITCH = 0.25 * MM
-"""From tooth to tooth around the tool."""
-LARGEST_FORCE, LARGEST_POWER = 10e3, 200e3
-"""[N], [W]: no robot and no spindle has more."""
-SOFTEST, HARDEST, SHARPEST, BLUNTEST = 1e6, 2e10, 1e6, 1.0 * MM
-"""[Pa] of Ktc: foam and superalloys; [N/m] of Kte; and of Kte over Ktc, which is of the size of the edges' radius."""
-LEAST_ASIDE, MOST_ASIDE = 0.005, 10.0
-"""Of the tangential coefficient: the radial one, and any other."""
 _TIMES_THE_BLANK, _LONG_BLANK, _SMALL_PROGRAM = 4.0, 2.0, 0.1
 _PARALLEL, _SQUARE, _ALONG = 0.999, 0.05, 0.996  # cosines
 _SHORT = 1e-6  # m
 _UPRIGHT, _THROUGH = 0.9, 1e-6  # cosine, m
 
-_RATIOS = {
-    25.4: "one of them is in inches",
-    1000.0: "one of them is in metres",
-    10.0: "one of them is in centimetres",
-    2.0: "one of them is a radius",
-}
+OF_STOCK = CheckCodes(
+    comment="STK019", speed="STK021", stopped="STK023", chip="STK024", size="STK025", force="STK028"
+)
 
 
-class _StatedCut(NamedTuple):
-    """What of a program a tool cuts: its rows (K,), the largest axial depth where it is wide and anywhere [m], the line
-    of each, largest force [N] and power [W]."""
-
-    rows: Ints
-    slot: tuple[float, int]
-    depth: tuple[float, int]
-    force: float
-    power: float
+def checked_cuts(process: StockProcess, sweeps: MotionSweeps, cut: EngagedMotions) -> dict[int, CheckedCut]:
+    """What each tool that cuts is stated to be, and what it cuts, by its index in ``sweeps``."""
+    cuts = {}
+    for index, cutter in enumerate(sweeps.cutters):
+        rows = np.unique(sweeps.motion[(sweeps.which == index) & (sweeps.rows[:, REMOVES] > 0)])
+        rows = rows[cut.cuts[rows]]
+        if not len(rows):
+            continue
+        size = np.linalg.norm(cut.largest[rows, :3], axis=1)
+        own = process.edges[cutter.number]
+        cuts[index] = CheckedCut(
+            name=f"tool {cutter.number}",
+            numbers=(cutter.number,),
+            diameter=2 * cutter.radius,
+            teeth=cutter.teeth,
+            helix=cutter.helix,
+            speed=own.speed,
+            material=own.material,
+            file=str(process.path),
+            line=cutter.line,
+            rows=rows,
+            depth=cut.depth[rows],
+            width=cut.width[rows],
+            force=float(np.nan_to_num(size).max(initial=0.0)),
+            power=float(np.abs(np.nan_to_num(cut.power[rows])).max(initial=0.0)),
+            drills=cutter.shape == "drill",
+        )
+    return cuts
 
 
 def contradictions(
     process: StockProcess,
     sweeps: MotionSweeps,
     cut: EngagedMotions,
+    checked: Mapping[int, CheckedCut],
     toolpath: Toolpath,
-    diameters: Mapping[int, float],
-    tip: Mapping[int, float],
+    frames: MotionFrames,
     program: str,
 ) -> list[Finding]:
-    """STK025 to STK028, STK030.  diameters: of the cell's tools by number [m]; tip: from the flange to their tips
-    [m]."""
+    """STK025 to STK028, STK030.  checked: as of ``checked_cuts``."""
     findings = []
-    path = str(process.path)
+    path, tip = str(process.path), _tips(toolpath, frames)
     for index, cutter in enumerate(sweeps.cutters):
         own = np.unique(sweeps.motion[(sweeps.which == index) & (sweeps.rows[:, REMOVES] > 0)])
         if not len(own):
             continue
-        rows = own[cut.cuts[own]]
-        if not len(rows):
+        if index not in checked:
             message = (
                 f"tool {cutter.number} moves at a feed in {len(own)} motions in lines {toolpath.line[own[0]]} to"
                 f" {toolpath.line[own[-1]]}, and cuts nothing"
             )
             findings.append(Finding("STK027", message, program, int(toolpath.line[own[0]])))
             continue
-        found = _cut_of(cutter, rows, cut, toolpath)
-        speed = process.edges[cutter.number].speed
-        turning = np.abs(toolpath.spindle[rows]) if speed is None else np.array([speed])
-        known = turning[np.isfinite(turning)]
+        findings += wrong_sizes(checked[index], frames.diameters, toolpath, OF_STOCK.size)
         for message, help in (
-            *_sizes(cutter, found, diameters.get(cutter.number), tip.get(cutter.number)),
-            *_helix_and_holder(cutter),
-            *_edges(cutter, float(known.max(initial=0.0))),
+            *_lengths(cutter, tip.get(cutter.number)),
             *_sideways(cutter, index, sweeps, cut.cuts, toolpath),
+            *_ridges(cutter, index, sweeps, cut.cuts, toolpath),
         ):
-            findings.append(Finding("STK025", message, path, cutter.line, help=help))
-        for message, help in _ridges(cutter, index, sweeps, cut.cuts, toolpath):
-            findings.append(Finding("STK025", message, path, cutter.line, help=help))
-        for message, help in _forces(cutter, found, process):
-            findings.append(Finding("STK028", message, path, cutter.line, help=help))
+            findings.append(Finding(OF_STOCK.size, message, path, cutter.line, help=help))
+        findings += wrong_forces(checked[index], OF_STOCK.force)
     findings += _through(sweeps, cut, toolpath, program)
     findings += [
         Finding("STK026", message, path, process.line, help=help) for message, help in _blank(sweeps, cut)
@@ -113,51 +100,22 @@ def contradictions(
     return findings
 
 
-def _cut_of(cutter: Cutter, rows: Ints, cut: EngagedMotions, toolpath: Toolpath) -> _StatedCut:
-    depth, width = cut.depth[rows], cut.width[rows]
-    wide = np.where(width >= _WIDE * 2 * cutter.radius, depth, 0.0)
-    at, slot = int(np.argmax(depth)), int(np.argmax(wide))
-    size = np.linalg.norm(cut.largest[rows, :3], axis=1)
-    return _StatedCut(
-        rows,
-        (float(wide[slot]), int(toolpath.line[rows[slot]])),
-        (float(depth[at]), int(toolpath.line[rows[at]])),
-        float(np.nan_to_num(size).max(initial=0.0)),
-        float(np.abs(np.nan_to_num(cut.power[rows])).max(initial=0.0)),
-    )
+def _tips(toolpath: Toolpath, frames: MotionFrames) -> dict[int, float]:
+    """Number of a tool -> how far its tip is from the flange [m]."""
+    tools, first = np.unique(toolpath.tool, return_index=True)
+    away = np.linalg.norm(frames.tool_in_flange.position[first], axis=1)
+    numbers = [toolpath.frames[index].number if index >= 0 else None for index in tools.tolist()]
+    return {
+        number: far
+        for number, far in zip(numbers, away.tolist(), strict=True)
+        if number is not None and np.isfinite(far)
+    }
 
 
-def _sizes(
-    cutter: Cutter, found: _StatedCut, of_cell: float | None, tip: float | None
-) -> Iterator[tuple[str, str]]:
-    """Message and help of each contradiction to the cell, and of the cut to the diameter."""
-    wide = 2 * cutter.radius
+def _lengths(cutter: Cutter, tip: float | None) -> Iterator[tuple[str, str]]:
+    """Message and help where edges or holder are longer than the tool is in the cell, or the holder is thinner than
+    the shank.  tip [m]: from the flange."""
     name = f"tool {cutter.number}"
-    if of_cell is not None and abs(wide - of_cell) > SAME_DIAMETER * of_cell:
-        own, other = wide / MM, of_cell / MM
-        message = f"{name} has the diameter {own:.6g} mm here, which is used, and {other:.6g} mm in the cell"
-        yield message, _reason(max(wide / of_cell, of_cell / wide))
-    if wide < THINNEST:
-        inches = wide * 25.4
-        message = f"{name} has a diameter of {wide / MM:.6g} mm: no robot mills with a cutter below 1 mm"
-        yield message, f"is it in inches? they would be {inches / MM:.6g} mm; state mm"
-    if wide > THICKEST:
-        yield f"{name} has a diameter of {wide / MM:.6g} mm, above 200 mm", "state mm"
-    if cutter.shape != "drill":
-        for (depth, line), most, what in (
-            (found.slot, DEEPEST_SLOT, "at half of its width or more"),
-            (found.depth, DEEPEST, "somewhere"),
-        ):
-            if depth > most * wide:
-                message = (
-                    f"{name} with the diameter {wide / MM:.6g} mm cuts {depth / MM:.4g} mm deep {what} (line"
-                    f" {line}): {depth / wide:.3g} times its diameter"
-                )
-                yield (
-                    message,
-                    "compare the diameter, its unit (mm), and the top of the blank with the program",
-                )
-                break
     for what, value in (
         ("its edges end", cutter.length),
         ("its holder starts", None if cutter.holder is None else cutter.holder[1]),
@@ -168,48 +126,12 @@ def _sizes(
                 " flange"
             )
             yield message, "compare the length with that of the tool in the cell; state mm"
-
-
-def _helix_and_holder(cutter: Cutter) -> Iterator[tuple[str, str]]:
-    """Message and help where helix or holder are of no tool."""
-    name = f"tool {cutter.number}"
-    if cutter.helix is not None and 0.0 < abs(cutter.helix) < LEAST_HELIX:
-        angle = cutter.helix / DEG
-        message = f"{name} has a helix of {angle:.4g} deg, less than any cutter that is not straight"
-        yield message, f"is it in rad? it would be {angle / DEG:.4g} deg; state deg, or 0 for straight edges"
     if cutter.shank is not None and cutter.holder is not None and cutter.holder[0] < cutter.shank:
         holder, shank = 2 * cutter.holder[0] / MM, 2 * cutter.shank / MM
         message = (
             f"{name} has a holder with the diameter {holder:.6g} mm, below that of its shank, {shank:.6g} mm"
         )
         yield message, "compare both: diameters, in mm"
-
-
-def _reason(ratio: float) -> str:
-    for known, words in _RATIOS.items():
-        if abs(ratio - known) < 0.03 * known:
-            return f"{ratio:.4g} times: {words}? state diameters in mm"
-    return "state the diameter in mm in both files"
-
-
-def _edges(cutter: Cutter, turning: float) -> Iterator[tuple[str, str]]:
-    """turning [rad/s]: the largest speed of the spindle."""
-    fast = turning * cutter.radius
-    if turning > FASTEST_TURN and 2 * cutter.radius > TURNS_FAST:
-        wide = 2 * cutter.radius / MM
-        message = f"tool {cutter.number}, diameter {wide:.6g} mm, turns at {turning * 30 / np.pi:.6g} 1/min"
-        yield message, "no spindle turns a cutter above 10 mm so fast; state spindle in 1/min"
-    if fast > FASTEST:
-        wide = 2 * cutter.radius / MM
-        message = f"the edges of tool {cutter.number}, diameter {wide:.6g} mm, move at {fast * 60:.5g} m/min"
-        yield message, "compare diameter (mm) and spindle (1/min): nothing is cut faster than 5000 m/min"
-    pitch = 2 * np.pi * cutter.radius / max(cutter.teeth or 1, 1)
-    if pitch < FINEST_PITCH:
-        message = (
-            f"tool {cutter.number} has {cutter.teeth} teeth on a diameter of {2 * cutter.radius / MM:.6g} mm,"
-            f" {pitch / MM:.3g} mm from one to the next"
-        )
-        yield message, "compare diameter (mm) and teeth"
 
 
 def _sideways(
@@ -287,42 +209,6 @@ def _ridges(
         f" {(apart[worst] - 2 * cutter.radius) / MM:.4g} mm remain between them"
     )
     yield message, "is the diameter a radius, or in another unit than mm?"
-
-
-def _forces(cutter: Cutter, found: _StatedCut, process: StockProcess) -> Iterator[tuple[str, str]]:
-    material = process.edges[cutter.number].material
-    name = f"tool {cutter.number}"
-    if material is not None:
-        cutting, edge = material.coefficients.cutting, material.coefficients.edge
-        ktc, kte = cutting[0], edge[0]
-        if not SOFTEST <= ktc <= HARDEST:
-            message = f"{name}: ktc of {ktc / 1e6:.4g} N/mm2 is that of no material"
-            yield message, "1 N/mm2 is foam, 5000 N/mm2 a superalloy; state ktc, krc, kac in N/mm2"
-        if kte > SHARPEST or kte > BLUNTEST * ktc > 0:
-            message = (
-                f"{name}: kte of {kte / 1e3:.4g} N/mm belongs to no edge for ktc of {ktc / 1e6:.4g} N/mm2"
-            )
-            yield message, "usual are some N/mm, 0.01 to 0.1 mm times ktc; state kte, kre, kae in N/mm"
-        for names, values, unit, scale in (
-            (("krc", "kac"), cutting, "N/mm2", 1e6),
-            (("kre", "kae"), edge, "N/mm", 1e3),
-        ):
-            for other, value in zip(names, values[1:], strict=True):
-                # the axial one may be as small as it likes
-                if value > MOST_ASIDE * values[0] > 0 or (
-                    other[1] == "r" and 0 < value < LEAST_ASIDE * values[0]
-                ):
-                    message = (
-                        f"{name}: {other} of {value / scale:.4g} {unit} does not belong to kt{other[2]} of"
-                        f" {values[0] / scale:.4g} {unit}"
-                    )
-                    yield message, f"usual is 0.1 to 1 times as much; state both in {unit}"
-    if found.force > LARGEST_FORCE or found.power > LARGEST_POWER:
-        message = (
-            f"{name} has a mean force of up to {found.force:.4g} N and a power of up to {found.power / 1e3:.4g} kW: no"
-            " robot mills with that"
-        )
-        yield message, "compare coefficients (N/mm2, N/mm), depth of cut and feed with the machine"
 
 
 def _through(

@@ -53,6 +53,9 @@ LEAST_AREA = 1e-11
 AS_STRAIGHT = 1e-6
 """[m] A turn of the tool that moves its edges by less along a piece is taken by its mean."""
 
+_AS_BEFORE = 1.1
+"""What remains at a place that was solved with a stock nearly the same is taken up to as many times what remained."""
+
 _STEPS, _TURNS, _HALVINGS = 8, 3, 18
 _DAMPED, _TURNING = 24, 0.7
 """Damped steps; and the share of the way from place to place by which the tool is displaced where it turns by much."""
@@ -224,6 +227,12 @@ def _solve(tool: ToolAtNode, nodes: Nodes, before: int, k: int, lever: float) ->
     r, r_before = np.zeros(6), np.zeros(6)
     w[:] = nodes.wrench[k]
     best = np.inf
+    if nodes.residual[k] > 0.0:
+        area = _met(tool, nodes, k, w, g)
+        size = _size(slope, g - w, lever)
+        if size <= SETTLED + max(OF_DISPLACEMENT * _size(slope, g, lever), _AS_BEFORE * nodes.residual[k]):
+            nodes.residual[k], nodes.area[k] = size, area
+            return
     displaced = max(_size(slope, w, lever), _size(slope, nodes.wrench[before], lever))
     turning = displaced > _TURNING * tool.came[3] > 0.0
     if turning and _settle_turning(tool, nodes, before, k, lever):

@@ -33,8 +33,9 @@ class Nodes(NamedTuple):
     """K places of paths, in the axes of the stock, wrenches [N, N m] about the tip.
 
     base (K, 6): displacement without wrench, shift [m] and turn [rad]; slope (K, 6, 6): its derivative by the wrench;
-    wrench (K, 6): of the nominal engagement, to be replaced by the solution; residual (K,) [m]: what remains between
-    both displacements; area (K,) [m2]: removed area across the feed.
+    wrench (K, 6): of the nominal engagement, or as it was solved before, to be replaced by the solution; residual (K,)
+    [m]: what remains between both displacements, 0 where it was not solved before; area (K,) [m2]: removed area across
+    the feed.
     """
 
     base: Floats

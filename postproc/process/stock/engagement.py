@@ -67,7 +67,8 @@ class EngagedMotions:
 
     cuts (N,); volume (N,) [m3] that is removed; mean (N, 6) and largest (N, 6) wrench [N, N m] along the motion, its
     moments about the tip, NaN where feed, teeth, spindle or material are not known; where the force, or without one the
-    removed area, is largest: depth (axial), width (across the feed) [m], entry and exit [rad], chip [m]; along (N,
+    removed area, is largest: depth (axial), width (across the feed) [m], entry and exit [rad], chip [m]; most (N, 2)
+    [m]: the largest depth and the largest width anywhere along it; along (N,
     2, 6): wrench at start and end of a line through the motion; profiles: of the motions along which it changes;
     power (N,) [W], the mean; speed (N,) [rad/s].
     hits: row of a motion -> the parts that collide; uneven (U,): sweeps along which the removed area changes.
@@ -81,6 +82,7 @@ class EngagedMotions:
     profiles: ForceProfiles
     depth: Floats
     width: Floats
+    most: Floats
     entry: Floats
     exit: Floats
     chip: Floats
@@ -363,6 +365,11 @@ def _by_motion(
     largest[rows] = wrench[best]
     turning = np.zeros(count)
     turning[sweeps.motion] = speed
+    sizes = np.column_stack(
+        [found[:, HIGH] - np.maximum(found[:, LOW], 0.0), found[:, LEFT] - found[:, RIGHT]]
+    )
+    most = np.zeros((count, 2))
+    np.maximum.at(most, motion[touches], sizes[touches])
     cuts = volume > 0
     return EngagedMotions(
         cuts=cuts,
@@ -373,6 +380,7 @@ def _by_motion(
         profiles=ForceProfiles.none(),
         depth=np.where(cuts, table[:, HIGH] - np.maximum(table[:, LOW], 0.0), 0.0),
         width=np.where(cuts, table[:, LEFT] - table[:, RIGHT], 0.0),
+        most=np.where(cuts[:, None], most, 0.0),
         entry=table[:, ENTRY],
         exit=table[:, EXIT],
         chip=np.where(np.isnan(mean[:, 0]), np.nan, table[:, CHIP]),

@@ -19,7 +19,7 @@ from postproc.process.stock.cutters import Cutter
 from postproc.process.stock.distance import AXIS, CUTTER, REMOVES, STEP, TIP_POINT
 from postproc.process.stock.engagement import EngagedMotions
 from postproc.process.stock.motion_sweeps import MotionSweeps
-from postproc.process.stock.stock_section import StockProcess
+from postproc.process.stock.stock_section import FOOT, StockProcess
 from postproc.toolpath import Toolpath
 
 FAR_BEYOND = 2.0
@@ -48,6 +48,7 @@ def misplaced_blank(
 ) -> list[Finding]:
     """STK032 and STK033, at the blank of the process file."""
     low, high = corners_of(cut.stock.blank)
+    foot = f"; {FOOT}" if process.blank == "cylinder" else ""
     findings = []
     for index, cutter in enumerate(sweeps.cutters):
         passes = _passes(index, sweeps, cut)
@@ -56,7 +57,8 @@ def misplaced_blank(
             ("STK033", _first_level(cutter, passes, toolpath)),
         ):
             findings += [
-                Finding(code, message, str(process.path), process.line, help=help) for message, help in found
+                Finding(code, message, str(process.path), process.line, help=help + foot)
+                for message, help in found
             ]
     return findings
 

@@ -63,12 +63,17 @@ class MotionSweeps:
 
 
 def find_sweeps(
-    toolpath: Toolpath, frames: MotionFrames, process: StockProcess, low: Floats, high: Floats, program: str
+    toolpath: Toolpath,
+    frames: MotionFrames,
+    process: StockProcess,
+    low: Floats,
+    high: Floats,
+    program: str,
+    stock: Poses,
 ) -> MotionSweeps:
-    """The sweeps of a program.  low, high (3,) [m]: the box around the blank, beside which nothing is divided.  Refusal
-    STK006: a tool that cuts is not stated; STK007: nothing can be simulated; STK010: the base of the stock; STK031:
-    more memory is needed than is free."""
-    stock = _stock_in_robot(toolpath, frames, process, program)
+    """The sweeps of a program.  low, high (3,) [m]: the box around the blank, beside which nothing is divided; stock
+    (1,): its axes in the robot base.  Refusal STK006: a tool that cuts is not stated; STK007: nothing can be simulated;
+    STK031: more memory is needed than is free; STK035: the part turns."""
     pose = stock.inverse() @ frames.base_in_robot
     turned = np.broadcast_to(pose.rotation, (len(toolpath), 3, 3))
     axis = -np.einsum("nij,nj->ni", turned @ toolpath.rotation, frames.spindle_in_tool)
@@ -81,6 +86,7 @@ def find_sweeps(
     simulated[1:] &= numbers[1:] == numbers[:-1]
     if not simulated.any():
         raise Refusal(Finding("STK007", "no motion has a known start, end and spindle axis", program))
+    _refuse_turned_part(toolpath, simulated & on_path, program)
     cutters, which = _cutters(toolpath, numbers, simulated & on_path, process, program)
     simulated &= which >= 0
     row = np.flatnonzero(simulated)
@@ -142,22 +148,16 @@ def find_sweeps(
     )
 
 
-def _stock_in_robot(toolpath: Toolpath, frames: MotionFrames, process: StockProcess, program: str) -> Poses:
-    """The axes of the stock in the robot base: the base that the process file names, or that of the first cut (1)."""
-    usable = toolpath.known & np.isfinite(frames.base_in_robot.position[:, 0])
-    if process.base is not None:
-        numbers = np.array(
-            [frame.number if frame.number is not None else -1 for frame in toolpath.frames] + [-1]
+def _refuse_turned_part(toolpath: Toolpath, on_path: Bools, program: str) -> None:
+    """Refusal STK035 where words turn the part between motions ``on_path`` (N,), about axes that nothing states."""
+    rows = np.flatnonzero(on_path)
+    turn = np.nan_to_num(toolpath.orientation_control.part_turn[rows])
+    away = np.flatnonzero(np.abs(turn - turn[:1]).max(axis=1, initial=0.0) > _PARALLEL)
+    if len(away):
+        message = (
+            "here A, B or C has turned the part since the first cut, and the stock does not turn with it"
         )
-        usable &= numbers[toolpath.base] == process.base
-        if not usable.any():
-            message = f"base {process.base} of the stock is used by no motion"
-            raise Refusal(Finding("STK010", message, str(process.path), process.line))
-    elif not usable.any():
-        raise Refusal(Finding("STK007", "no motion has a known target and base", program))
-    on_path = usable & np.isin(toolpath.kind, (Kind.LIN, Kind.CIRC, Kind.SPL))
-    first = int(np.argmax(on_path if on_path.any() else usable))
-    return frames.base_in_robot[first : first + 1]
+        raise Refusal(Finding("STK035", message, program, int(toolpath.line[rows[away[0]]])))
 
 
 def _cutters(

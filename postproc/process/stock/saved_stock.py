@@ -19,26 +19,31 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.read_files import read_file
 from postproc.process.stock.blank import MESH, Blank, mesh_blank
 from postproc.process.stock.distance import CUTTER, REMOVES, ROW
+from postproc.process.stock.stock_place import NO_NUMBER
 from postproc.process.stock.stock_section import StockProcess
 
 VERSION = 1
 _KEYS = ("version", "frame", "corners", "rows", "cutters")
+_BASE = "base"
 
 
 @dataclass(frozen=True, eq=False)
 class Removed:
-    """What earlier programs removed: rows (M, ROW) and cutters (T, 6), see ``distance``."""
+    """What earlier programs removed: rows (M, ROW) and cutters (T, 6), see ``distance``; base: number of that in whose
+    axes they are, or ``NO_NUMBER``."""
 
     rows: Floats
     cutters: Floats
+    base: int = NO_NUMBER
 
 
-def stock_bytes(blank: Blank, rows: Floats, cutters: Floats) -> bytes:
-    """A stock file of a blank and the sweeps (M, ROW) of ``cutters`` (T, 6) that were in it."""
+def stock_bytes(blank: Blank, rows: Floats, cutters: Floats, base: int) -> bytes:
+    """A stock file of a blank and the sweeps (M, ROW) of ``cutters`` (T, 6) that were in it, in the axes of the base of
+    that number, or of ``NO_NUMBER``."""
     buffer = io.BytesIO()
     kept = rows[rows[:, REMOVES] > 0]
     values = (np.array([VERSION]), blank.frame, blank.corners, kept, cutters)
-    arrays: dict[str, Any] = dict(zip(_KEYS, values, strict=True))
+    arrays: dict[str, Any] = dict(zip(_KEYS, values, strict=True)) | {_BASE: np.array([base])}
     np.savez_compressed(buffer, **arrays)
     return buffer.getvalue()
 
@@ -49,6 +54,7 @@ def read_stock(path: Path, process: StockProcess) -> tuple[Blank, Removed]:
     try:
         with np.load(io.BytesIO(raw)) as archive:
             values = [np.asarray(archive[key], float) for key in _KEYS]
+            base = int(archive[_BASE].item()) if _BASE in archive else NO_NUMBER
     except (ValueError, KeyError, OSError, zipfile.BadZipFile, EOFError):
         raise _refused(path, "it is no stock file", process) from None
     version, frame, corners, rows, cutters = values
@@ -65,7 +71,7 @@ def read_stock(path: Path, process: StockProcess) -> tuple[Blank, Removed]:
     blank = Blank(frame, corners, np.zeros(1, np.int64))
     if frame[0] == MESH:
         blank = mesh_blank(corners.reshape(-1, 3, 3))
-    return blank, Removed(rows, cutters)
+    return blank, Removed(rows, cutters, base)
 
 
 def _refused(path: Path, message: str, process: StockProcess) -> Refusal:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,33 +12,40 @@ from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.findings import Finding, Refusal
 from postproc.base.units import MM
 from postproc.cell import MotionFrames
+from postproc.process.cut_checks import CheckedCut
 from postproc.process.force_profiles import ForceProfiles
+from postproc.process.spindle_checks import differing_speed, implausible_chips, speed_words, stopped_spindle
 from postproc.process.stated_forces import BASE, FEED, StatedForces
 from postproc.process.stock.blank import Blank, box_blank, corners_of, cylinder_blank, mesh_blank
-from postproc.process.stock.chip_loads import implausible_chips
-from postproc.process.stock.contradictions import contradictions
+from postproc.process.stock.contradictions import OF_STOCK, checked_cuts, contradictions
 from postproc.process.stock.cutters import CUTTING, HOLDER, SHANK
 from postproc.process.stock.distance import AXIS, CUTTER, REMOVES, STEP, TIP_POINT, TURN
 from postproc.process.stock.engagement import EngagedMotions, engage, laws_of
 from postproc.process.stock.misplaced_blank import misplaced_blank
 from postproc.process.stock.motion_sweeps import MotionSweeps, find_sweeps
+from postproc.process.stock.removal_order import unordered_removal
 from postproc.process.stock.saved_stock import Removed, read_stock, stock_bytes
 from postproc.process.stock.stl import read_stl
-from postproc.process.stock.stock_section import StockProcess, read_stock_process
-from postproc.process.stock.tool_comments import CommentedTool, read_named_diameters, read_tool_comments
+from postproc.process.stock.stock_place import (
+    NO_NUMBER,
+    is_same_place,
+    stock_places,
+    uncertain_base,
+)
+from postproc.process.stock.stock_section import FOOT, StockProcess, read_stock_process
+from postproc.process.tool_comments import CommentedTool, read_named_diameters, read_tool_comments
 from postproc.toolpath import Kind, Toolpath
 
 _PARTS = {CUTTING: "the cutter", SHANK: "the shank", HOLDER: "the holder"}
 _MOST_FINDINGS = 20
 _NO_MOVE = 1e-7  # m
-_SAME_SPEED = 0.001
 _SMALL = 10 * MM  # a blank that is no longer, or one of 10 m in metres
 
 
 @dataclass(frozen=True, eq=False)
 class StockRun:
     """A program in its stock.  before: what earlier programs removed; ci95 (N,): of the forces, as a share, NaN
-    where not stated."""
+    where not stated; base: number of that in which the stock lies, or ``NO_NUMBER``."""
 
     process: StockProcess
     toolpath: Toolpath
@@ -48,26 +55,26 @@ class StockRun:
     engagement: EngagedMotions
     ci95: Floats
     findings: tuple[Finding, ...]
+    base: int
 
     def stock_file(self) -> bytes:
         """What the program leaves, as a stock file."""
         stock = self.engagement.stock
-        return stock_bytes(self.blank, stock.sweeps, stock.cutters)
+        return stock_bytes(self.blank, stock.sweeps, stock.cutters, self.base)
 
 
 def simulate(path: Path, toolpath: Toolpath, frames: MotionFrames, program: str) -> StockRun:
     """Run a program through the stock of the process file ``path``.
 
-    Refusal: of the file; STK002 to STK005, STK016: of the blank; STK006, STK007, STK010: of tools and frames; STK008:
-    no motion reaches the stock; STK031: more memory is needed than is free.
+    Refusal: of the file; STK002 to STK005, STK016: of the blank; STK006, STK007, STK010, STK035, STK036: of tools and
+    frames; STK008: no motion reaches the stock; STK031: more memory is needed than is free.
     """
     commented = read_tool_comments(toolpath)
     process = read_stock_process(path, commented)
     blank, before = _blank(process)
     low, high = corners_of(blank)
-    sweeps = find_sweeps(toolpath, frames, process, low, high, program)
     edges = process.edges
-    engagement = engage(blank, sweeps, toolpath, edges, before)
+    base, sweeps, engagement = _placed(toolpath, frames, process, (blank, before), program)
     if not engagement.cuts.any():
         raise Refusal(_beside(process, sweeps, low, high, program, toolpath))
     ci95 = np.full(len(toolpath), np.nan)
@@ -75,31 +82,42 @@ def simulate(path: Path, toolpath: Toolpath, frames: MotionFrames, program: str)
         material = edges[cutter.number].material
         if material is not None and material.ci95 is not None:
             ci95[sweeps.motion[sweeps.rows[:, CUTTER] == index]] = material.ci95
+    checked = checked_cuts(process, sweeps, engagement)
     findings = [
         *_collisions(engagement, toolpath, program),
         *_not_simulated(sweeps, toolpath, program),
+        *unordered_removal(toolpath, engagement.cuts, program),
         *_lengths(sweeps, process),
         *_commented(sweeps, commented, frames.diameters, str(process.path), toolpath, program),
-        *implausible_chips(sweeps, engagement, process, toolpath, program),
-        *_speeds(sweeps, engagement.cuts, process, toolpath, program),
-        *contradictions(
-            process, sweeps, engagement, toolpath, frames.diameters, _tips(toolpath, frames), program
-        ),
+        *_spindle(checked.values(), toolpath, program),
+        *contradictions(process, sweeps, engagement, checked, toolpath, frames, program),
         *misplaced_blank(process, sweeps, engagement, toolpath),
     ]
-    return StockRun(process, toolpath, blank, before, sweeps, engagement, ci95, tuple(findings))
+    return StockRun(process, toolpath, blank, before, sweeps, engagement, ci95, tuple(findings), base)
 
 
-def _tips(toolpath: Toolpath, frames: MotionFrames) -> dict[int, float]:
-    """Number of a tool -> how far its tip is from the flange [m]."""
-    tools, first = np.unique(toolpath.tool, return_index=True)
-    away = np.linalg.norm(frames.tool_in_flange.position[first], axis=1)
-    numbers = [toolpath.frames[index].number if index >= 0 else None for index in tools.tolist()]
-    return {
-        number: far
-        for number, far in zip(numbers, away.tolist(), strict=True)
-        if number is not None and np.isfinite(far)
-    }
+def _placed(
+    toolpath: Toolpath,
+    frames: MotionFrames,
+    process: StockProcess,
+    stock: tuple[Blank, Removed | None],
+    program: str,
+) -> tuple[int, MotionSweeps, EngagedMotions]:
+    """The number of the base in which the blank lies, and what is cut of it there: where nothing states it, the base of
+    the first motion that cuts."""
+    blank, before = stock
+    low, high = corners_of(blank)
+    places = stock_places(toolpath, frames, process, NO_NUMBER if before is None else before.base, program)
+    tried: list[tuple[int, MotionSweeps, EngagedMotions]] = []
+    for number, place in places:
+        sweeps = find_sweeps(toolpath, frames, process, low, high, program, place)
+        tried.append((number, sweeps, engage(blank, sweeps, toolpath, process.edges, before)))
+        first = np.flatnonzero(tried[-1][2].cuts)[:1]
+        if len(places) == 1 or (len(first) and is_same_place(frames.base_in_robot[first], place)):
+            return tried[-1]
+    if any(one.cuts.any() for _, _, one in tried):
+        raise uncertain_base(process, [number for number, _ in places])
+    return tried[0]
 
 
 def _blank(process: StockProcess) -> tuple[Blank, Removed | None]:
@@ -239,7 +257,7 @@ def _summaries(run: StockRun, toolpath: Toolpath, path: Path) -> list[Finding]:
         message = (
             f"tool {cutter.number} cuts in {len(rows)} motions in lines {toolpath.line[rows[0]]} to "
             f"{toolpath.line[rows[-1]]}, removes {cut.volume[rows].sum() / MM**3:.0f} mm3, ap up to "
-            f"{cut.depth[rows].max() / MM:.2f} mm, ae up to {cut.width[rows].max() / MM:.2f} mm, feed per "
+            f"{cut.most[rows, 0].max() / MM:.2f} mm, ae up to {cut.most[rows, 1].max() / MM:.2f} mm, feed per "
             f"tooth up to {chip[own].max() / MM:.3g} mm, mean force over a turn up to {size.max():.0f} N{name}"
         )
         findings.append(Finding("STK014", message, str(path), cutter.line))
@@ -341,47 +359,29 @@ def _commented(
     return findings
 
 
-def _speeds(
-    sweeps: MotionSweeps, cuts: Bools, process: StockProcess, toolpath: Toolpath, program: str
-) -> list[Finding]:
-    """Which speeds of the spindle are those of the program, and where the process file states others."""
+def _spindle(cuts: Iterable[CheckedCut], toolpath: Toolpath, program: str) -> list[Finding]:
+    """Which speeds of the spindle are those of the program, where the process file states others, and where the feed
+    per tooth is that of no cutter."""
     findings = []
-    for index, cutter in enumerate(sweeps.cutters):
-        rows = np.unique(sweeps.motion[sweeps.which == index])
-        rows = rows[cuts[rows]]
-        back, stopped = rows[toolpath.spindle[rows] < 0], rows[toolpath.spindle[rows] == 0]
+    for cut in cuts:
+        findings += implausible_chips(cut, toolpath, program, OF_STOCK.chip)
+        spindle = toolpath.spindle[cut.rows]
+        back = cut.rows[spindle < 0]
         if len(back):
             message = (
-                f"the program turns the spindle counter-clockwise in {len(back)} motions that cut: tool"
-                f" {cutter.number} is taken for one that cuts so"
+                f"the program turns the spindle counter-clockwise in {len(back)} motions that cut: {cut.name} is"
+                " taken for one that cuts so"
             )
             findings.append(Finding("STK022", message, program, int(toolpath.line[back[0]])))
-        if len(stopped):
+        findings += stopped_spindle(cut, toolpath, program, OF_STOCK.stopped)
+        findings += differing_speed(cut, toolpath, program, OF_STOCK.speed)
+        rows = cut.rows[_turns(spindle)]
+        if cut.speed is None and len(rows):
             message = (
-                f"tool {cutter.number} cuts in {len(stopped)} motions after the program stops the spindle"
+                f"the S of the program determines the speed of {cut.name}:"
+                f" {speed_words(np.abs(toolpath.spindle[rows]))} 1/min in {len(rows)} motions"
             )
-            findings.append(Finding("STK023", message, program, int(toolpath.line[stopped[0]])))
-        rows = rows[_turns(toolpath.spindle[rows])]
-        stated = process.edges[cutter.number].speed
-        if stated is not None:
-            rows = rows[np.abs(np.abs(toolpath.spindle[rows]) - stated) > _SAME_SPEED * stated]
-        if not len(rows):
-            continue
-        turns = np.unique(np.round(np.abs(toolpath.spindle[rows]) * 30 / np.pi, 3))
-        words = f"{turns[0]:g}" if len(turns) == 1 else f"{turns[0]:g} to {turns[-1]:g}"
-        line = int(toolpath.line[rows[0]])
-        if stated is None:
-            message = (
-                f"the S of the program determines the speed of tool {cutter.number}: {words} 1/min in"
-                f" {len(rows)} motions"
-            )
-            findings.append(Finding("STK020", message, program, line))
-        else:
-            message = (
-                f"tool {cutter.number} cuts {len(rows)} motions at S {words}; the process file states spindle"
-                f" {stated * 30 / np.pi:g} 1/min, which is used"
-            )
-            findings.append(Finding("STK021", message, program, line))
+            findings.append(Finding("STK020", message, program, int(toolpath.line[rows[0]])))
     return findings
 
 
@@ -401,7 +401,8 @@ def _beside(
     )
     message = f"no motion cuts: the blank is in {box(low, high)}, and {moves} (mm)"
     small = float((high - low).max()) < _SMALL
-    help = "The blank is stated in mm: is it in metres?" if small else ""
+    help = FOOT if process.blank == "cylinder" else ""
+    help = "The blank is stated in mm: is it in metres?" if small else help
     swallowed = [cutter for cutter in sweeps.cutters if 2 * cutter.radius > float((high - low)[:2].max())]
     if swallowed and not small:
         wide = ", ".join(f"tool {one.number} {2 * one.radius / MM:.6g} mm" for one in swallowed)

@@ -14,10 +14,11 @@ from postproc.base.yaml_section import YamlSection, load
 from postproc.process.materials import Material
 from postproc.process.process_file import ProcessValues, read_material, read_whole
 from postproc.process.stock.cutters import SHAPES, Cutter
-from postproc.process.stock.tool_comments import CommentedTool
+from postproc.process.tool_comments import CommentedTool
 
 BLANKS = ("box", "cylinder", "stl", "from")
 AXES = ("x", "y", "z")
+FOOT = "center is the middle of a cylinder's foot, from which height goes along +axis"
 _EDGES = ("teeth", "helix", "spindle", "material", "coefficients", "ci95")
 _SHAPE_KEYS = {"bull": ("corner_radius",), "cone": ("angle", "tip_diameter"), "drill": ("point_angle",)}
 _FAR = 100_000.0  # mm
@@ -37,9 +38,9 @@ class Edges:
 class StockProcess:
     """A process file with a stock.
 
-    blank: one of BLANKS; numbers: of a box its corners (2, 3) [m], of a cylinder centre (3,), diameter and height
-    [m] in one row; lengthwise: axis of a cylinder; file: of ``stl`` and ``from``; scale: mm of the STL's unit.
-    base: number of the base whose axes these are, None for that of the first cut.  rapid [m/s]: motions at this
+    blank: one of BLANKS; numbers: of a box its corners (2, 3) [m], of a cylinder the middle of its foot (3,), diameter
+    and height [m] in one row; lengthwise: axis of a cylinder; file: of ``stl`` and ``from``; scale: mm of the STL's
+    unit.  base: number of the base whose axes these are, None for that of the first cut.  rapid [m/s]: motions at this
     feed and above do not cut.
     """
 
@@ -71,7 +72,10 @@ def read_stock_process(path: Path, commented: Mapping[int, CommentedTool] | None
     kinds = [key for key in BLANKS if key in stock]
     if len(kinds) != 1:
         what = f"excludes {kinds[0]!r}" if kinds else "does not state the blank"
-        help = "state one of: box: [[x, y, z], [x, y, z]], cylinder: {...}, stl: FILE, from: FILE.stock"
+        help = (
+            "state one of: box: [[x, y, z], [x, y, z]], cylinder: {center: [x, y, z], diameter: ..., height: ...,"
+            " axis: z}, stl: FILE, from: FILE.stock; "
+        ) + FOOT
         raise stock.error("YML004" if kinds else "YML003", what, kinds[1] if kinds else None, help)
     kind = kinds[0]
     numbers, lengthwise, file, scale = _blank(stock, kind, path)
@@ -132,6 +136,9 @@ def _blank(stock: YamlSection, kind: str, path: Path) -> tuple[list[list[float]]
     if kind == "cylinder":
         section = stock.section("cylinder")
         section.only("center", "diameter", "height", "axis")
+        for key in ("center", "diameter", "height"):
+            if key not in section:
+                raise section.error("YML003", f"the key {key!r} is missing", None, FOOT)
         centre = section.numbers("center", 3, unit="mm")
         diameter, height = (
             section.number(key, low=1e-3, high=_FAR, unit="mm") for key in ("diameter", "height")
