@@ -97,7 +97,8 @@ def ramped(chance):  # type: ignore[no-untyped-def]
     step[:, 1] = chance.choice([5.0, 60.0, -300.0], len(ends))
     none = np.zeros(len(ends), bool)
     ramps = Ramps(row, np.zeros(len(ends)), job.desired_path.length[row],
-                  np.array([one[1] for one in ends]), step, none, none)  # fmt: skip
+                  np.array([one[1] for one in ends]), step, step, none, none, row, np.ones(len(ends)),
+                  none)  # fmt: skip
     path = replace(
         job.toolpath, constraints=replace(job.toolpath.constraints, exact_stays=bool(chance.random() < 0.5))
     )

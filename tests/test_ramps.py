@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from judge.cases import steps_of_force
+from judge.cases import FIVE_AXIS, gcode, steps_of_force
 from path_cases import corner, line
 from spring_cases import MM, spring
 
@@ -36,7 +37,7 @@ def test_a_ramp_adds_what_is_left_of_its_step(seed):
     ramps = Ramps.of(rows, step, length, extent, carries)
     motions, share = rng.integers(0, len(extent), 200), rng.random(200)
     share[:40] = rng.integers(0, 2, 40)
-    found = ramps.at(motions, share)
+    found = ramps.at(motions, share, np.zeros((200, 6)))
     for motion, t, added in zip(motions, share, found, strict=True):
         expected = np.zeros(6)
         for row, change, long in zip(rows, step, length, strict=True):
@@ -70,10 +71,75 @@ def test_a_share_of_a_step_goes_over_before_it(seed):
             elif row <= motion and carries[row : motion + 1].all():
                 walked = extent[row:motion].sum() + t * extent[motion]
                 expected[k] -= max(1 - walked / long, 0) * (1 - part) * change
-    np.testing.assert_allclose(ramped.ramps.at(motions, share), expected, atol=1e-12)
+    np.testing.assert_allclose(ramped.ramps.at(motions, share, values[motions]), expected, atol=1e-12)
     found, _, shares = ramped.ramps.steps()
     np.testing.assert_array_equal(found, rows)
     np.testing.assert_allclose(shares, early, atol=1e-12)
+
+
+@pytest.mark.parametrize("early", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("seed", range(10))
+def test_a_ramp_is_a_mean_of_the_force_that_ends_and_of_that_which_acts(seed, early):
+    """Of forces that change along their motions too: at every vertex the mean by the path that is left, straight in
+    between and to where a ramp ends."""
+    _, _, length, extent, carries, rng = some_ramps(seed)
+    extent, n = extent + 0.1, len(extent)
+    length[:] = length[0]
+    rows = np.flatnonzero(carries[1:] & carries[:-1]) + 1
+    rows = rows[:: max(2, len(rows) // 6)]
+    begin, end = rng.normal(size=(2, n, 6)) * carries[:, None]
+    goes_on = np.setdiff1d(np.arange(1, n), rows)
+    begin[goes_on] = np.where(carries[goes_on, None], end[goes_on - 1], 0.0)
+    force = Wrenches(end, begin, carries, "test", (), np.isin(np.arange(n), rows))
+    ramped = force.ramped(rows, length[: len(rows)], extent, np.full(len(rows), early))
+    motions = np.flatnonzero(carries)
+    for t, own in ((0.0, begin), (1.0, end)):
+        expected = own[motions].copy()
+        for k, row in enumerate(rows):
+            stop = rows[k + 1] if k + 1 < len(rows) else n
+            first = rows[k - 1] if k else 0
+            for place, motion in enumerate(motions):
+                if motion >= row and carries[row : motion + 1].all():
+                    walked = extent[row:motion].sum() + t * extent[motion]
+                    acts = own[motion] if motion < stop else end[stop - 1]
+                    apart = acts - end[row - 1]
+                    passed = [begin[m] - end[m - 1] for m in range(row + 1, min(motion + 1, stop))]
+                    apart -= np.sum(passed, axis=0) if passed else 0.0  # where a cut has no step
+                    expected[place] -= (1 - early) * max(1 - walked / length[0], 0) * apart
+                elif motion < row and carries[motion:row].all():
+                    walked = extent[motion + 1 : row].sum() + (1 - t) * extent[motion]
+                    acts = own[motion] if motion >= first else begin[first]
+                    expected[place] += early * max(1 - walked / length[0], 0) * (begin[row] - acts)
+        np.testing.assert_allclose(ramped.along(motions, np.full(len(motions), t)), expected, atol=1e-12)
+    # straight between the places where anything ends
+    at, share = ramped.ramps.ends()
+    for motion in motions:
+        knots = np.unique(np.concatenate([[0.0, 1.0], share[at == motion]]))
+        for low, high in pairwise(knots):
+            three = ramped.along(np.full(3, motion), np.array([low, 0.5 * (low + high), high]))
+            np.testing.assert_allclose(three[1], 0.5 * (three[0] + three[2]), atol=1e-12)
+
+
+@pytest.mark.parametrize("radius", [0.3, 1.0, 4.0, 20.0])
+@pytest.mark.parametrize("motion", ["arc", "polyline"])
+@pytest.mark.parametrize("ramp", ["", "force_ramp: 20\n"])
+def test_a_force_of_one_size_is_nowhere_larger_where_the_path_turns(tmp_path, radius, motion, ramp):
+    """Stated along the feed, of one size from a corner on: turning with the path, on its ramp too."""
+    turn = np.linspace(0.0, np.pi, 37)[1:]
+    if motion == "arc":
+        half = [f"G2 X{2 * radius:.4f} Y0 I{radius:.4f} J0"]
+    else:
+        half = [f"X{radius * (1 - np.cos(a)):.4f} Y{radius * np.sin(a):.4f}" for a in turn]
+    body = ["G21 G90 G17 G54 F2000", "T1 M6", "G0 X-40. Y0. Z20.", "G1 Z0. F600", "X0.", *half]
+    program = gcode(*body, f"G1 X{2 * radius:.4f} Y-40.", "Z20. F3000", cell=FIVE_AXIS + ramp)(tmp_path)
+    task = prepare(Request(program, force="250,80,0@feed")).task
+    assert task.force.ramps is not None
+    size = np.hypot(250.0, 80.0)
+    cut = np.flatnonzero(task.carries)
+    rows, share = np.repeat(cut, 101), np.tile(np.linspace(0.0, 1.0, 101), len(cut))
+    found = np.linalg.norm(task.force.along(rows, share)[:, :3], axis=1)
+    assert found.max() < size * (1 + 1e-6)
+    assert task.force.max_force < size * (1 + 1e-6)
 
 
 @pytest.mark.parametrize("seed", range(5))

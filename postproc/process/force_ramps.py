@@ -1,22 +1,29 @@
 """Ramps of the wrench: where it steps inside a cut, it goes over along a stretch of the path.
 
-A force does not jump in zero length: it changes while the engagement does, over about the tool's radius.  A step dw
-at the vertex where a motion starts acts, at the path length s after that vertex, as
+A force does not jump in zero length: it changes while the engagement does, over about the tool's radius.  At the path
+length s after the vertex where a motion starts, the force w_old that ends there still acts with the rest of the ramp,
 
-    w(s) = w_new(s) - dw max(0, 1 - s / r)
+    w(s) = w_new(s) - max(0, 1 - s / r) D(s),    D(s) = w_new(s) - w_old
 
-so that the motion before keeps its own force up to the vertex, and the new one is whole at s = r.  Steps that lie
-nearer to each other than r add up.  Where the force changes inside of a motion, as at entries and exits, parts of the
-same form add up to its profile.  A share of the step may go over before its vertex, along the motions that lead to it.
+so that the motion before keeps its own force up to the vertex, the new one is whole at s = r, and no force between
+is larger than both.  D follows what w_new does: on an arc along which it turns as written here; along other motions
+the product is straight between their ends, and D that of the last vertex where the ramp ends between them.  Steps that
+lie nearer to each other than r add up, and behind the next one D stays.  Where the force changes inside of a motion, as
+at entries and exits, parts of the same form with a constant D add up to its profile.  A share of the step may go over
+before its vertex, along the motions that lead to it: the same, read backwards.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+
+Sides = Callable[[Ints], tuple[Floats, Floats, Bools]]
+"""Of motions (M,): the wrench (M, 6) [N, N m] where each starts and where it ends, and whether it turns (M,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,9 +31,11 @@ class Ramps:
     """E parts of ramps, one for each motion that a ramp leads over, ascending by motion.
 
     row (E,): the motion; start (E,) [m]: path length from the step to where the motion starts; extent (E,) [m]: length
-    of the motion; length (E,) [m]: of the whole ramp, > 0; step (E, 6) [N, N m]: new minus old wrench, robot base axes,
-    of ``before`` old minus new; inside (E,): part of the profile of its motion, no step; before (E,): it leads to its
-    step: start is from where the motion ends.
+    of the motion; length (E,) [m]: of the whole ramp, > 0; step, end (E, 6) [N, N m]: new minus old wrench where the
+    motion starts and where it ends, robot base axes, of ``before`` old minus new; inside (E,): part of the profile of
+    its motion, no step; before (E,): it leads to its step: start and step are of where the motion ends.
+    vertex (E,): the motion that starts with the step; share (E,): how much of the step goes over in this ramp.
+    turning (E,): along the motion the wrench turns: there the difference is ``step`` + ``share`` times the wrench.
     """
 
     row: Ints
@@ -34,8 +43,12 @@ class Ramps:
     extent: Floats
     length: Floats
     step: Floats
+    end: Floats
     inside: Bools
     before: Bools
+    vertex: Ints
+    share: Floats
+    turning: Bools
 
     @staticmethod
     def of(rows: Ints, step: Floats, length: Floats, extent: Floats, carries: Bools) -> Ramps:
@@ -53,14 +66,21 @@ class Ramps:
         )
         start = distance[row] - np.repeat(distance[rows], count)
         order = np.argsort(row, kind="stable")
+        row, whose = row[order], np.repeat(np.arange(len(rows)), count)[order]
+        never = np.zeros(len(row), bool)
+        constant = step[whose]
         return Ramps(
-            row[order],
+            row,
             start[order],
-            extent[row[order]],
-            np.repeat(length, count)[order],
-            np.repeat(step, count, axis=0)[order],
-            np.zeros(len(row), bool),
-            np.zeros(len(row), bool),
+            extent[row],
+            length[whose],
+            constant,
+            constant,
+            never,
+            never,
+            rows[whose],
+            np.ones(len(row)),
+            never,
         )
 
     @staticmethod
@@ -71,7 +91,38 @@ class Ramps:
         last = len(carries) - 1
         back = Ramps.of(last + 1 - rows, -step, length, extent[::-1], carries[::-1])
         turned = Ramps(*(getattr(back, one.name)[::-1] for one in fields(back)))
-        return replace(turned, row=last - turned.row, before=np.ones(len(turned.row), bool))
+        ahead = np.ones(len(turned.row), bool)
+        return replace(turned, row=last - turned.row, vertex=last + 1 - turned.vertex, before=ahead)
+
+    def following(self, rows: Ints, early: Floats, sides: Sides) -> Ramps:
+        """The same with differences that follow the wrench of the motions that the ramps lead over.
+
+        rows (K,): all motions that start with a step, ascending; early (K,): how much of each goes over before it;
+        sides: as of ``Sides``, without any ramps.
+        """
+        if not len(self.row):
+            return self
+        place = np.searchsorted(rows, self.vertex)
+        share = np.where(self.before, early[place], 1.0 - early[place])
+        motions = np.unique(self.row)
+        begin, end, turns = sides(motions)
+        changed = np.vstack([np.zeros(6), np.cumsum(end - begin, axis=0)])
+        # behind the next step a difference stays
+        first, stop = np.append(0, rows)[place], np.append(rows, motions[-1] + 1)[place + 1]
+        follows = np.where(self.before, self.row >= first, self.row < stop)
+        near = np.where(self.before, np.maximum(self.row + 1, first), np.minimum(self.row, stop))
+        far = np.where(follows, np.where(self.before, self.row, self.row + 1), near)
+        origin, near, far = (changed[np.searchsorted(motions, at)] for at in (self.vertex, near, far))
+        step = self.step + share[:, None] * (near - origin)
+        last = step + share[:, None] * (far - near)
+        at = np.searchsorted(motions, self.row)
+        turning = np.flatnonzero(follows & turns[at])
+        side = np.where(self.before[turning, None], end[at[turning]], begin[at[turning]])
+        step[turning] -= share[turning, None] * side
+        last[turning] = step[turning]
+        mask = np.zeros(len(self.row), bool)
+        mask[turning] = True
+        return replace(self, step=step, end=last, share=share, turning=mask)
 
     @staticmethod
     def profile(row: Ints, share: Floats, rest: Floats, extent: Floats) -> Ramps:
@@ -90,14 +141,20 @@ class Ramps:
         length = share * extent[row]
         step = share[:, None] * (before - after)[knot]
         some = length > 0
+        row, length, step = row[some], length[some], step[some]
+        never = np.zeros(len(row), bool)
         return Ramps(
-            row[some],
-            np.zeros(int(some.sum())),
-            extent[row][some],
-            length[some],
-            step[some],
-            np.ones(int(some.sum()), bool),
-            np.zeros(int(some.sum()), bool),
+            row,
+            np.zeros(len(row)),
+            extent[row],
+            length,
+            step,
+            step,
+            ~never,
+            never,
+            row,
+            np.ones(len(row)),
+            never,
         )
 
     def only(self, some: Bools) -> Ramps:
@@ -111,7 +168,7 @@ class Ramps:
         share = np.concatenate([self.length / self.extent, np.zeros(len(motions))])
         order = np.lexsort((share, row))
         row, share = row[order], share[order]
-        return row, share, self.at(row, share)
+        return row, share, self.at(row, share, np.zeros((len(row), 6)))
 
     def joined(self, other: Ramps) -> Ramps:
         """Both, in their order."""
@@ -119,30 +176,32 @@ class Ramps:
         pairs = ((getattr(self, one.name), getattr(other, one.name)) for one in fields(self))
         return Ramps(*(np.concatenate(pair)[order] for pair in pairs))
 
-    def at(self, rows: Ints, share: Floats) -> Floats:
-        """(K, 6) what the ramps add to the new wrench at the shares ``share`` (K,) of the motions ``rows`` (K,)."""
+    def at(self, rows: Ints, share: Floats, wrench: Floats) -> Floats:
+        """(K, 6) what the ramps add to the new wrench ``wrench`` (K, 6) at the shares ``share`` (K,) of the motions
+        ``rows`` (K,)."""
         added = np.zeros((len(rows), 6))
         first = np.searchsorted(self.row, rows, "left")
         count = np.searchsorted(self.row, rows, "right") - first
         for i in range(int(count.max(initial=0))):
             some = np.flatnonzero(count > i)
             part = first[some] + i
-            ahead = np.where(self.before[part], 1.0 - share[some], share[some])
-            distance = self.start[part] + ahead * self.extent[part]
-            added[some] -= np.maximum(1.0 - distance / self.length[part], 0.0)[:, None] * self.step[part]
+            ahead = np.where(self.before[part], 1.0 - share[some], share[some])[:, None]
+            start, extent, length = (a[part, None] for a in (self.start, self.extent, self.length))
+            step, end = self.step[part], self.end[part]
+            turned = np.where(self.turning[part], self.share[part], 0.0)[:, None] * wrench[some]
+            here = np.maximum(1.0 - (start + ahead * extent) / length, 0.0) * (step + turned)
+            there = np.maximum(1.0 - (start + extent) / length, 0.0)
+            added[some] -= here + ahead * there * (end - step)
         return added
 
     def steps(self) -> tuple[Ints, Floats, Floats]:
         """Motions (K,) that start with a step, ascending, the lengths (K,) [m] of its ramps, and the shares (K,) of it
         that go over before."""
-        at = np.flatnonzero((self.start == 0.0) & ~self.inside)
-        vertex = self.row[at] + self.before[at]
-        rows, whose = np.unique(vertex, return_inverse=True)
-        length, size = np.zeros(len(rows)), np.linalg.norm(self.step[at], axis=1)
-        np.maximum.at(length, whose, self.length[at])
-        whole = np.bincount(whose, size, len(rows))
-        early = np.bincount(whose, size * self.before[at], len(rows))
-        return rows, length, early / np.where(whole > 0, whole, 1.0)
+        rows, at = np.unique(self.vertex[~self.inside], return_inverse=True)
+        length, early = np.zeros(len(rows)), np.zeros(len(rows))
+        np.maximum.at(length, at, self.length[~self.inside])
+        early[at] = np.where(self.before, self.share, 1.0 - self.share)[~self.inside]
+        return rows, length, early
 
     def ends(self) -> tuple[Ints, Floats]:
         """Motions (E',) inside of which a ramp ends, ascending, and the shares of their length (E',) where it does."""

@@ -115,7 +115,7 @@ class Wrenches:
         if self.ramps is None:
             return self.values
         rows, values = np.unique(self.ramps.row), self.values.copy()
-        values[rows] += self.ramps.at(rows, np.ones(len(rows)))
+        values[rows] += self.ramps.at(rows, np.ones(len(rows)), self.values[rows])
         return frozen(values)
 
     def largest_along(self, rows: Ints) -> Floats:
@@ -154,7 +154,12 @@ class Wrenches:
         if len(lead):
             ahead = early[lead, None] * step[lead]
             ramps = ramps.joined(Ramps.leading(rows[lead], ahead, length[lead], extent, carries))
+        ramps = ramps.following(rows, early, self._sides)
         return replace(self, steps=steps, ramps=ramps if self.ramps is None else self.ramps.joined(ramps))
+
+    def _sides(self, rows: Ints) -> tuple[Floats, Floats, Bools]:
+        turns = np.zeros(len(rows), bool) if self.turning is None else self.turning.mask[rows]
+        return self.start[rows], self.values[rows], turns
 
     def along(self, rows: Ints, fraction: Floats) -> Floats:
         """(K, 6) the wrench at the shares ``fraction`` (K,), 0 to 1, of the path of the motions ``rows`` (K,).
@@ -169,7 +174,7 @@ class Wrenches:
             at = rows[turned]
             wrench[turned] = self.turning.along(at, fraction[turned], self.start[at], self.values[at])
         if self.ramps is not None:
-            wrench += self.ramps.at(rows, fraction)
+            wrench += self.ramps.at(rows, fraction, wrench)
         return wrench
 
 

@@ -11,7 +11,9 @@ changes linearly over a ramp of total length r, half of it on each side (at most
 mean of both sides at the vertex.  A cut begins and ends with steps.
 
 That is the rule CENTRED.  By the rule AFTER the motion before a vertex keeps its force up to it, and the change goes
-over along r behind it.
+over along r behind it: what acts is a mean of that force and of the one of the motion, by the part of r that is walked.
+Up to the next such vertex the mean is with the force of the place: exact on an arc in whose frame the force is stated,
+and straight between the ends of other motions; behind it by as much as at that vertex.
 
 By the rule STRETCHED, which the package states of its output and which is judged by, along r = max(ramp, d / 0.9)
 behind it: d is by how much the target that brings the tool to the vertex goes back along the feed there, from the force
@@ -66,15 +68,18 @@ class Field:
         self.begin, self.end = begin, end
         # ramps at the vertices that are left: their half, and the wrench in their middle
         step = np.flatnonzero(~smooth)
-        self.after: list[tuple[float, float, np.ndarray]] = []
+        self.after: list[tuple[float, float, list[np.ndarray], int]] = []
         if rule != CENTRED:
-            for k in step:
+            for k, following in zip(step, [*step[1:], len(end) - 1], strict=False):
                 reach, change = ramp, begin[k + 1] - end[k]
                 if rule == STRETCHED and correct is not None:
                     moved = correct(low + k + 1, end[k]) - correct(low + k + 1, begin[k + 1])
                     feed = path.tangent(np.array([low + k + 1]), np.zeros(1))[0]
                     reach = max(ramp, moved @ feed / STEEPEST)
-                self.after.append((path.start[low + k + 1], reach, change))
+                apart = [change]  # from the force that ends, at the ends of the motions up to the next step
+                for m in range(k + 1, following + 1):
+                    apart.append(apart[-1] + end[m] - begin[m])
+                self.after.append((path.start[low + k + 1], reach, apart, int(k + 1)))
             step = step[:0]
         lengths = path.length[self.rows]
         self.ramp = np.zeros((2, len(self.rows)))  # at the begin and at the end of each motion
@@ -174,8 +179,21 @@ class Field:
                 own = self.begin if side == 0 else self.end
                 change = self.middle[side, k[rows]] - own[k[rows]]
                 wrench[rows] += (1 - away[rows] / half[rows])[:, None] * change
-        for place, reach, change in self.after:
+        for place, reach, apart, first in self.after:
             behind = label - place
-            rows = np.flatnonzero((behind >= 0) & (behind < reach))
-            wrench[rows] -= (1 - behind[rows] / reach)[:, None] * change
+            for row in np.flatnonzero((behind >= 0) & (behind < reach)):
+                m, left = int(k[row]), 1 - behind[row] / reach
+                if m - first >= len(apart) - 1:
+                    wrench[row] -= left * apart[-1]
+                elif self.path.arc[i[row]] and self.frames[m] in ("feed", "tool"):
+                    here = self._plain(i[row : row + 1], share[row : row + 1])[0]
+                    wrench[row] -= left * (apart[m - first] + here - self.begin[m])
+                else:
+                    until = 1 - (behind[row] + (1 - share[row]) * length[row]) / reach
+                    since = 1 - (behind[row] - share[row] * length[row]) / reach
+                    if until > 0:
+                        one, two = since * apart[m - first], until * apart[m - first + 1]
+                        wrench[row] -= (1 - share[row]) * one + share[row] * two
+                    else:
+                        wrench[row] -= left * apart[m - first]
         return wrench
