@@ -345,6 +345,25 @@ def small_step_of_force() -> Callable[[Path], Path]:
     )  # fmt: skip
 
 
+def step_into_a_turn(radius: float, pieces: int, ramp: str = "") -> Callable[[Path], Path]:
+    """A force that turns with the path and steps where a half circle begins: an arc, or as many straight motions."""
+    turn = np.linspace(0.0, np.pi, pieces + 1)[1:]
+    half = [f"X{radius * (1 - np.cos(a)):.4f} Y{radius * np.sin(a):.4f}" for a in turn]
+    if pieces == 1:
+        half = [f"G2 X{2 * radius:.4f} Y0. I{radius:.4f} J0."]
+    body = [
+        "G21 G90 G17 G54",
+        "T1 M6",
+        "G0 X-40. Y0. Z20.",
+        "G1 Z0. F600",
+        "(FORCE 250 80 0 @FEED)",
+        "X0.",
+        *half,
+    ]
+    leave = [f"G1 X{2 * radius:.4f} Y-40.", "(FORCE OFF)", "G1 Z20. F3000"]
+    return gcode(*body, *leave, cell=FIVE_AXIS + ramp)
+
+
 def helix(turns: int) -> Callable[[Path], Path]:
     body = [f"G3 X40. Y0. Z{-2.0 * k - 2:.3f} I-40. J0." for k in range(turns)]
     return gcode("G21 G90 G17 G54", "T1 M6", "G0 X40. Y0. Z20.", "G1 Z0. F600", "(FORCE -150 260 -60 @FEED)", *body,
@@ -431,6 +450,11 @@ CASES: list[Case] = [
     Case("half a turn first", turn_over(180.0)),
     Case("steps of force", steps_of_force()),
     Case("a small step of force", small_step_of_force()),
+    *(
+        Case(f"step into a turn, r {r:g}, {n} motions{', ramp 20' if ramp else ''}", step_into_a_turn(r, n, ramp),
+             judged="position")
+        for r, n, ramp in ((4, 1, ""), (4, 1, "force_ramp: 20\n"), (2, 1, ""), (4, 36, "force_ramp: 20\n"))
+    ),
     *(Case(f"helix, {n} turns", helix(n), judged="position") for n in (1, 4)),
     Case("corners, tolerance 10, no insertions", lambda f: _loose(f), ("--no-insert",), wanted="not worse"),
     Case("panel, tolerance 10, no insertions", lambda f: _loose(f, "kr270_panel", "panel.src"), ("--no-insert",),

@@ -181,19 +181,20 @@ class Field:
                 wrench[rows] += (1 - away[rows] / half[rows])[:, None] * change
         for place, reach, apart, first in self.after:
             behind = label - place
-            for row in np.flatnonzero((behind >= 0) & (behind < reach)):
-                m, left = int(k[row]), 1 - behind[row] / reach
+            on = np.flatnonzero((behind >= 0) & (behind < reach))
+            for m in np.unique(k[on]):
+                rows = on[k[on] == m]
+                part, t = (1 - behind[rows] / reach)[:, None], share[rows, None]
                 if m - first >= len(apart) - 1:
-                    wrench[row] -= left * apart[-1]
-                elif self.path.arc[i[row]] and self.frames[m] in ("feed", "tool"):
-                    here = self._plain(i[row : row + 1], share[row : row + 1])[0]
-                    wrench[row] -= left * (apart[m - first] + here - self.begin[m])
+                    wrench[rows] -= part * apart[-1]
+                elif self.path.arc[m + self.low] and self.frames[m] in ("feed", "tool"):
+                    changed = self._plain(i[rows], share[rows]) - self.begin[m]
+                    wrench[rows] -= part * (apart[m - first] + changed)
                 else:
-                    until = 1 - (behind[row] + (1 - share[row]) * length[row]) / reach
-                    since = 1 - (behind[row] - share[row] * length[row]) / reach
-                    if until > 0:
-                        one, two = since * apart[m - first], until * apart[m - first + 1]
-                        wrench[row] -= (1 - share[row]) * one + share[row] * two
-                    else:
-                        wrench[row] -= left * apart[m - first]
+                    since, until = (
+                        1 - (self.path.start[m + self.low] - place + at) / reach
+                        for at in (0.0, self.path.length[m + self.low])
+                    )
+                    straight = (1 - t) * since * apart[m - first] + t * until * apart[m - first + 1]
+                    wrench[rows] -= straight if until > 0 else part * apart[m - first]
         return wrench
