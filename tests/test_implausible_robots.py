@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,11 @@ GAP = "  - {effect: backlash, parameters: {b1: {value: 0.5, unit: deg, source: n
         ("value: 184.72, unit: mm", "value: 0.18472, unit: mm", "gravity_compensator.L is 0.00018472"),
         ("kuka: {unit: mm,", "kuka: {unit: m,", "the arm is 3179 m long"),
         (
+            "  A3: [-119, 155]",
+            "  A3: {limits: [-119, 155], offset: 1.5708}",
+            "joints.A3: the offset is 1.5708 deg, a round number if it is 1.5708 rad",
+        ),
+        (
             "effects:\n",
             "effects:\n" + GAP,
             "backlash.b1 is 0.00872665 rad; built hardware has 0 to 0.004 rad",
@@ -43,6 +49,19 @@ def test_a_number_in_another_unit_is_reported(tmp_path, old, new, said):
     findings = StiffnessModel.from_robot(load_robot(path)).plausibility_findings()
     assert [finding.code for finding in findings] == ["MOD004"]
     assert said in findings[0].message
+
+
+@pytest.mark.parametrize(("unit", "many"), [("deg", 4), ("rad", 0)])
+def test_an_angle_of_a_table_that_is_in_radians_is_reported(tmp_path, unit, many):
+    """Four quarter turns; the two angles of zero are zero in both."""
+    rows = "".join(
+        f"      - {{a: 100, alpha: {angle}, d: 700}}\n" for angle in (-1.5708, 0, 1.5708, -1.5708, 1.5708, 0)
+    )
+    table = f"  dh:\n    unit: mm\n    angle_unit: {unit}\n    rows:\n{rows}"
+    path = tmp_path / "arm.yaml"
+    path.write_text(re.sub(r"  kuka: .*\n", table, ARM.partition("effects:")[0]) + "effects: []\n")
+    found = StiffnessModel.from_robot(load_robot(path)).plausibility_findings()
+    assert sum("a round number if it is" in finding.message for finding in found) == many
 
 
 @pytest.mark.parametrize(

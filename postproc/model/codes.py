@@ -19,7 +19,7 @@ CODES = define(
         "MOD004": Code(
             "warning",
             "implausible number in the robot file",
-            meaning="A compliance, a spring or a length has a size that built hardware does not have.",
+            meaning="A compliance, a spring, a length or an angle has a size that built hardware does not have.",
             consequence="The predicted deflection and its correction would be too large or too small.",
             action="Check the value and its unit.",
             example="A joint compliance of 3e-10 rad/(N m).",

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses
-from postproc.base.units import DEG, MM
+from postproc.base.units import DEG, MM, are_radians
 from postproc.effects import Load
 from postproc.model.mechanics import Mechanics
 from postproc.robot.geometries import KukaLengths, KukaVariant
@@ -29,7 +29,7 @@ def find_implausible(model: Mechanics) -> list[Finding]:
     limits = model.robot.limits
     angles = np.linspace(limits[:, 0], limits[:, 1], 181)
     state = model.state(angles, np.zeros((len(angles), 6)), Poses.identity())
-    findings = [*_links(model), *_parameters(model)]
+    findings = [*_links(model), *_angles(model), *_parameters(model)]
     for term in model.terms:
         if not isinstance(term.effect, Load):
             continue
@@ -71,6 +71,25 @@ def _links(model: Mechanics) -> Iterator[Finding]:
                 f"geometry.kuka.{name} is {length / MM:g} mm; is it in another unit than the other lengths?"
             )
             yield Finding("MOD004", message, str(model.robot.path), help="check the length and `unit`")
+
+
+def _angles(model: Mechanics) -> Iterator[Finding]:
+    """Offsets of joints, and angles between their axes, that are round numbers if they are radians."""
+    arm = model.robot.nominal
+    stated = [
+        (f"joints.{axis.name}: the offset", axis.offset / DEG)
+        for axis in getattr(arm, "axes", ())
+        if axis.kind == "revolute"
+    ]
+    for index, link in enumerate(arm.links()):
+        for pose in (link.before, link.after):
+            x, z = pose.rotation[:, 0], pose.rotation[:, 2]
+            sizes = np.arccos(np.clip(z[2], -1.0, 1.0)), np.arctan2(x[1], x[0])
+            stated += [(f"geometry: an angle of link {index + 1}", float(angle) / DEG) for angle in sizes]
+    for what, angle in stated:
+        if are_radians([round(angle, 9)]):
+            message = f"{what} is {angle:.6g} deg, a round number if it is {angle:.6g} rad"
+            yield Finding("MOD004", message, str(model.robot.path), help="check the angle and its unit")
 
 
 def _parameters(model: Mechanics) -> Iterator[Finding]:
