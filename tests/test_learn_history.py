@@ -191,8 +191,13 @@ def test_a_kill_at_any_moment_loses_nothing(shop):
     was there before is still somewhere, and the same command gives the same files."""
     program, record = shop / "part.src", shop / RECORD
     lines = (shop / "part1.csv").read_text().splitlines()
-    other = shop / "part2.csv"  # of the same plant: parts that contradict each other are refused
-    other.write_text("\n".join([*lines[:-2], ""]))
+    other = shop / "part2.csv"  # of the same plant: parts that contradict each other are refused, and copies
+    rng, begin = np.random.default_rng(1), next(i for i, line in enumerate(lines) if not line.startswith("#"))
+    column = lines[begin].split(",").index("DEV")
+    rows = [line.split(",") for line in lines[begin + 1 :]]
+    for row in rows:
+        row[column] = f"{float(row[column]) + rng.normal(0.0, 0.005):.5f}"
+    other.write_text("\n".join([*lines[: begin + 1], *(",".join(row) for row in rows), ""]))
     words = ["learn", program, other, "-q"]
     before = record.read_bytes()
     old = (shop / "learned" / "part.src").read_bytes()

@@ -370,6 +370,7 @@ def parameter_text(parameter, word):
 @example(0.302e-6, 0.01, "rad/(N m)", True, 1.0)
 @example(9.9999999999e-4, 1e-9, "mm", True, 1.0)
 @example(99999.99999999, None, "1", False, 1.0)
+@example(1e-5, 1e-5, "N/mm", False, -1.0)
 def test_a_value_and_its_interval_keep_their_digits(size, share, word, of_95, sign):
     si = writing.UNITS[word][0]
     value, width = sign * size, None if share is None else share * size

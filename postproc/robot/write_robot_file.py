@@ -220,36 +220,45 @@ def parameter_fields(parameter: WrittenParameter, word: str) -> CommentedMap:
     value = float(parameter.value) / factor
     interval = parameter.interval if parameter.ci95 is None else parameter.ci95
     width = None if interval is None else float(interval) / factor
-    exponent = _exponent(value or width or 0.0)
     fitted = 0.0 if parameter.ci95 is None else float(parameter.ci95) / factor
-    rounding = max(VALUE_DIGITS * abs(value), INTERVAL_DIGITS * min(fitted, abs(value)))
-    fields: dict[str, object] = {"value": _number(value, rounding, exponent), "unit": word}
+    written = _rounded(value, max(VALUE_DIGITS * abs(value), INTERVAL_DIGITS * min(fitted, abs(value))))
+    half = None
     if width is not None:
-        if not 1e-4 <= width / 10.0**exponent < 1e5:
-            exponent = _exponent(width)
+        half = _rounded(width, (VALUE_DIGITS if parameter.ci95 is None else INTERVAL_DIGITS) * width)
+    exponent = _exponent(written or half or Decimal(0))
+    fields: dict[str, object] = {"value": _number(written, exponent), "unit": word}
+    if half is not None:
+        if not Decimal("1e-4") <= half.scaleb(-exponent) < Decimal("1e5"):
+            exponent = _exponent(half)
         if parameter.ci95 is not None:
-            fields["ci95"] = _number(width, INTERVAL_DIGITS * width, exponent)
+            fields["ci95"] = _number(half, exponent)
         else:
-            fields |= {"ci": _number(width, VALUE_DIGITS * width, exponent), "ci_level": "unstated"}
+            fields |= {"ci": _number(half, exponent), "ci_level": "unstated"}
     return in_braces(fields | {"source": Quoted(_possible(parameter.source))})
 
 
-def _exponent(number: float) -> int:
+def _exponent(number: Decimal) -> int:
     """Engineering: a multiple of 3, the mantissa from 0.1 up to 100; 0 where the number reads well without one."""
-    if number == 0.0 or 1e-2 <= abs(number) < 1e5:
+    if not number or -2 <= number.adjusted() < 5:
         return 0
-    return 3 * math.floor((math.log10(abs(number)) + 1.0) / 3.0)
+    return 3 * ((number.adjusted() + 1) // 3)
 
 
-def _number(number: float, rounding: float, exponent: int) -> Number:
+def _rounded(number: float, rounding: float) -> Decimal:
     """``number`` with the decimals that keep it within ``rounding``; never beyond it, as it may be at its bound."""
     if number == 0.0:
-        return Number("0")
+        return Decimal(0)
     exact, step = Decimal(number), Decimal(1).scaleb(math.floor(math.log10(rounding)))
     rounded = exact.quantize(step)
     if abs(rounded) > abs(exact) * (1 + _NOISE):
         rounded = exact.quantize(step, ROUND_DOWN)
-    digits = f"{rounded.scaleb(-exponent).normalize():f}"
+    return rounded
+
+
+def _number(number: Decimal, exponent: int) -> Number:
+    if not number:
+        return Number("0")
+    digits = f"{number.scaleb(-exponent).normalize():f}"
     return Number(f"{digits}e{exponent}" if exponent else digits)
 
 
