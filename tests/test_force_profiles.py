@@ -37,10 +37,8 @@ def test_ramps_of_a_profile_add_up_to_it(seed):
         own = motion == row
         at = np.linspace(0, 1, 101)
         expected = [np.interp(at, share[own], wrench[own, k]) for k in range(6)]
-        np.testing.assert_allclose(
-            ramps.at(np.full(101, row), at, np.zeros((101, 6))), np.array(expected).T, atol=1e-9
-        )
-    assert not ramps.at(np.arange(0, 20, 2), np.full(10, 0.4), np.zeros((10, 6))).any()
+        np.testing.assert_allclose(ramps.at(np.full(101, row), at), np.array(expected).T, atol=1e-9)
+    assert not ramps.at(np.arange(0, 20, 2), np.full(10, 0.4)).any()
     back = ramps.places()
     assert back[0].tolist() == motion.tolist()
     np.testing.assert_allclose(back[1], share, atol=1e-12)
@@ -54,7 +52,7 @@ def test_profiles_and_ramps_of_steps_add_up():
     steps = Ramps.of(np.array([4]), np.ones((1, 6)), np.array([0.25]), extent, np.ones(20, bool))
     both = profile.joined(steps)
     rows, at = np.repeat(np.arange(20), 11), np.tile(np.linspace(0, 1, 11), 20)
-    total, *parts = (ramps.at(rows, at, np.zeros((len(rows), 6))) for ramps in (both, profile, steps))
+    total, *parts = (ramps.at(rows, at) for ramps in (both, profile, steps))
     np.testing.assert_allclose(total, np.sum(parts, axis=0), atol=1e-12)
     assert (np.diff(both.row) >= 0).all()
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 from judge.cases import FIVE_AXIS, gcode, steps_of_force
+from judge.drawn import drawn
+from judge.force import STRETCHED, Field
+from judge.judge import Cell, Path, Robot, correction_along, cuts_of, read
 from path_cases import corner, line
 from spring_cases import MM, spring
 
@@ -37,7 +39,7 @@ def test_a_ramp_adds_what_is_left_of_its_step(seed):
     ramps = Ramps.of(rows, step, length, extent, carries)
     motions, share = rng.integers(0, len(extent), 200), rng.random(200)
     share[:40] = rng.integers(0, 2, 40)
-    found = ramps.at(motions, share, np.zeros((200, 6)))
+    found = ramps.at(motions, share)
     for motion, t, added in zip(motions, share, found, strict=True):
         expected = np.zeros(6)
         for row, change, long in zip(rows, step, length, strict=True):
@@ -71,53 +73,10 @@ def test_a_share_of_a_step_goes_over_before_it(seed):
             elif row <= motion and carries[row : motion + 1].all():
                 walked = extent[row:motion].sum() + t * extent[motion]
                 expected[k] -= max(1 - walked / long, 0) * (1 - part) * change
-    np.testing.assert_allclose(ramped.ramps.at(motions, share, values[motions]), expected, atol=1e-12)
+    np.testing.assert_allclose(ramped.ramps.at(motions, share), expected, atol=1e-12)
     found, _, shares = ramped.ramps.steps()
     np.testing.assert_array_equal(found, rows)
     np.testing.assert_allclose(shares, early, atol=1e-12)
-
-
-@pytest.mark.parametrize("early", [0.0, 0.4, 1.0])
-@pytest.mark.parametrize("seed", range(10))
-def test_a_ramp_is_a_mean_of_the_force_that_ends_and_of_that_which_acts(seed, early):
-    """Of forces that change along their motions too: at every vertex the mean by the path that is left, straight in
-    between and to where a ramp ends."""
-    _, _, length, extent, carries, rng = some_ramps(seed)
-    extent, n = extent + 0.1, len(extent)
-    length[:] = length[0]
-    rows = np.flatnonzero(carries[1:] & carries[:-1]) + 1
-    rows = rows[:: max(2, len(rows) // 6)]
-    begin, end = rng.normal(size=(2, n, 6)) * carries[:, None]
-    goes_on = np.setdiff1d(np.arange(1, n), rows)
-    begin[goes_on] = np.where(carries[goes_on, None], end[goes_on - 1], 0.0)
-    force = Wrenches(end, begin, carries, "test", (), np.isin(np.arange(n), rows))
-    ramped = force.ramped(rows, length[: len(rows)], extent, np.full(len(rows), early))
-    motions = np.flatnonzero(carries)
-    for t, own in ((0.0, begin), (1.0, end)):
-        expected = own[motions].copy()
-        for k, row in enumerate(rows):
-            stop = rows[k + 1] if k + 1 < len(rows) else n
-            first = rows[k - 1] if k else 0
-            for place, motion in enumerate(motions):
-                if motion >= row and carries[row : motion + 1].all():
-                    walked = extent[row:motion].sum() + t * extent[motion]
-                    acts = own[motion] if motion < stop else end[stop - 1]
-                    apart = acts - end[row - 1]
-                    passed = [begin[m] - end[m - 1] for m in range(row + 1, min(motion + 1, stop))]
-                    apart -= np.sum(passed, axis=0) if passed else 0.0  # where a cut has no step
-                    expected[place] -= (1 - early) * max(1 - walked / length[0], 0) * apart
-                elif motion < row and carries[motion:row].all():
-                    walked = extent[motion + 1 : row].sum() + (1 - t) * extent[motion]
-                    acts = own[motion] if motion >= first else begin[first]
-                    expected[place] += early * max(1 - walked / length[0], 0) * (begin[row] - acts)
-        np.testing.assert_allclose(ramped.along(motions, np.full(len(motions), t)), expected, atol=1e-12)
-    # straight between the places where anything ends
-    at, share = ramped.ramps.ends()
-    for motion in motions:
-        knots = np.unique(np.concatenate([[0.0, 1.0], share[at == motion]]))
-        for low, high in pairwise(knots):
-            three = ramped.along(np.full(3, motion), np.array([low, 0.5 * (low + high), high]))
-            np.testing.assert_allclose(three[1], 0.5 * (three[0] + three[2]), atol=1e-12)
 
 
 @pytest.mark.parametrize("radius", [0.3, 1.0, 4.0, 20.0])
@@ -140,6 +99,55 @@ def test_a_force_of_one_size_is_nowhere_larger_where_the_path_turns(tmp_path, ra
     found = np.linalg.norm(task.force.along(rows, share)[:, :3], axis=1)
     assert found.max() < size * (1 + 1e-6)
     assert task.force.max_force < size * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("motion", ["arc", "polyline"])
+def test_the_smaller_a_step_the_less_the_force_differs(tmp_path, motion):
+    """Where the force turns with the path behind it."""
+    turn = np.linspace(0.0, np.pi, 37)[1:]
+    half = [f"X{4 * (1 - np.cos(a)):.4f} Y{4 * np.sin(a):.4f}" for a in turn]
+    half = ["G2 X8. Y0. I4. J0."] if motion == "arc" else half
+    rows, share = np.repeat(np.arange(40), 51), np.tile(np.linspace(0.0, 1.0, 51), 40)
+
+    def along(before):
+        lines = [
+            "G0 X0. Y-40. Z20.",
+            "G1 Z0. F600",
+            f"(FORCE {before} 80 0 @FEED)",
+            "Y0.",
+            "(FORCE 250 80 0 @FEED)",
+        ]
+        program = gcode("G21 G90 G17 G54", "T1 M6", *lines, *half, "(FORCE OFF)", "G1 Z20. F3000")(tmp_path)
+        force = prepare(Request(program, force="")).task.force
+        if before != 250:
+            force = replace(force, steps=force.steps | (np.arange(len(force)) == 3))
+            length = np.full(len(force), 0.3e-3)
+            force = force.ramped(np.array([3]), np.array([6e-3]), length, np.zeros(1))
+        some = rows < len(force) - 1
+        return force.along(rows[some], share[some])
+
+    even = along(250)
+    for step in (1.0, 1e-3):
+        assert np.abs(along(250 - step) - even).max() < 1.5 * step
+
+
+@pytest.mark.parametrize("seed", range(16000, 16008))
+def test_forces_are_those_of_another_reader(tmp_path, seed):
+    """Of programs drawn at random: its own statements of what acts on ramps, along polylines and arcs."""
+    program = drawn(seed).build(tmp_path)
+    cell = Cell.load(tmp_path / "cell.yaml")
+    path = Path(read(program, cell), Robot.find(cell.robot, cell.folder), cell)
+    largest = max(np.linalg.norm(m.force[0][:3]) for m in path.motions if not m.air)
+    correct = correction_along(path)
+    task = prepare(Request(program, force="")).task
+    rows, share = iter(np.flatnonzero(task.carries)), np.linspace(1e-6, 1.0 - 1e-6, 13)
+    for low, high in cuts_of(path.motions):
+        field = Field(path, low, high, cell.ramp, largest, STRETCHED, correct)
+        for motion in range(low, high + 1):
+            row = next(rows)
+            found = task.force.along(np.full(13, row), share).reshape(-1, 2, 3) @ task.base.rotation[row]
+            expected = field.at(path.start[motion] + share * path.length[motion])
+            np.testing.assert_allclose(found.reshape(-1, 6), expected, atol=1e-3 * largest)
 
 
 @pytest.mark.parametrize("seed", range(5))

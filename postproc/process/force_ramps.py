@@ -1,29 +1,28 @@
 """Ramps of the wrench: where it steps inside a cut, it goes over along a stretch of the path.
 
-A force does not jump in zero length: it changes while the engagement does, over about the tool's radius.  At the path
-length s after the vertex where a motion starts, the force w_old that ends there still acts with the rest of the ramp,
+A force does not jump in zero length: it changes while the engagement does, over about the tool's radius.  A step dw
+at the vertex where a motion starts acts, at the path length s after that vertex, as
 
-    w(s) = w_new(s) - max(0, 1 - s / r) D(s),    D(s) = w_new(s) - w_old
+    w(s) = w_new(s) - max(0, 1 - s / r) C(s) C(0)^T dw
 
-so that the motion before keeps its own force up to the vertex, the new one is whole at s = r, and no force between
-is larger than both.  D follows what w_new does: on an arc along which it turns as written here; along other motions
-the product is straight between their ends, and D that of the last vertex where the ramp ends between them.  Steps that
-lie nearer to each other than r add up, and behind the next one D stays.  Where the force changes inside of a motion, as
-at entries and exits, parts of the same form with a constant D add up to its profile.  A share of the step may go over
-before its vertex, along the motions that lead to it: the same, read backwards.
+so that the motion before keeps its own force up to the vertex, and the new one is whole at s = r.  C is the frame in
+which the new force is stated: where it turns with the path, what remains of the old force turns too, and none between
+is larger than both.  At a vertex where the frame turns the mean of both sides acts, as of the wrench itself; between
+the ends of a straight motion what is added is straight, from its last vertex where the ramp ends in it.  Behind the
+next step, or where forces are stated in another frame, the step stays as it came there.  Steps that lie nearer to each
+other than r add up.  Where the force changes inside of a motion, as at entries and exits, parts of the same form add up
+to its profile.  A share of the step may go over before its vertex, along the motions that lead to it: the same, read
+backwards.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
-
-Sides = Callable[[Ints], tuple[Floats, Floats, Bools]]
-"""Of motions (M,): the wrench (M, 6) [N, N m] where each starts and where it ends, and whether it turns (M,)."""
+from postproc.process.force_turning import Turning
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +34,7 @@ class Ramps:
     motion starts and where it ends, robot base axes, of ``before`` old minus new; inside (E,): part of the profile of
     its motion, no step; before (E,): it leads to its step: start and step are of where the motion ends.
     vertex (E,): the motion that starts with the step; share (E,): how much of the step goes over in this ramp.
-    turning (E,): along the motion the wrench turns: there the difference is ``step`` + ``share`` times the wrench.
+    on_arc (E,): between its ends the step turns with the arc, by ``turning``.
     """
 
     row: Ints
@@ -48,7 +47,8 @@ class Ramps:
     before: Bools
     vertex: Ints
     share: Floats
-    turning: Bools
+    on_arc: Bools
+    turning: Turning | None = None
 
     @staticmethod
     def of(rows: Ints, step: Floats, length: Floats, extent: Floats, carries: Bools) -> Ramps:
@@ -90,39 +90,50 @@ class Ramps:
         """
         last = len(carries) - 1
         back = Ramps.of(last + 1 - rows, -step, length, extent[::-1], carries[::-1])
-        turned = Ramps(*(getattr(back, one.name)[::-1] for one in fields(back)))
+        turned = replace(back, **{name: getattr(back, name)[::-1] for name in _COLUMNS})
         ahead = np.ones(len(turned.row), bool)
         return replace(turned, row=last - turned.row, vertex=last + 1 - turned.vertex, before=ahead)
 
-    def following(self, rows: Ints, early: Floats, sides: Sides) -> Ramps:
-        """The same with differences that follow the wrench of the motions that the ramps lead over.
+    def shared(self, rows: Ints, early: Floats) -> Ramps:
+        """The same, of steps at the start of ``rows`` (K,), ascending, of which the shares ``early`` (K,) go over
+        before them."""
+        place = early[np.searchsorted(rows, self.vertex)]
+        return replace(self, share=np.where(self.before, place, 1.0 - place))
 
-        rows (K,): all motions that start with a step, ascending; early (K,): how much of each goes over before it;
-        sides: as of ``Sides``, without any ramps.
+    def turned(self, turning: Turning, breaks: Bools) -> Ramps:
+        """The same with steps that turn with the frames of the motions that the ramps lead over.
+
+        breaks (N,): motions that do not continue the frame of the motion before, or start with a step.
         """
-        if not len(self.row):
-            return self
-        place = np.searchsorted(rows, self.vertex)
-        share = np.where(self.before, early[place], 1.0 - early[place])
-        motions = np.unique(self.row)
-        begin, end, turns = sides(motions)
-        changed = np.vstack([np.zeros(6), np.cumsum(end - begin, axis=0)])
-        # behind the next step a difference stays
-        first, stop = np.append(0, rows)[place], np.append(rows, motions[-1] + 1)[place + 1]
-        follows = np.where(self.before, self.row >= first, self.row < stop)
-        near = np.where(self.before, np.maximum(self.row + 1, first), np.minimum(self.row, stop))
-        far = np.where(follows, np.where(self.before, self.row, self.row + 1), near)
-        origin, near, far = (changed[np.searchsorted(motions, at)] for at in (self.vertex, near, far))
-        step = self.step + share[:, None] * (near - origin)
-        last = step + share[:, None] * (far - near)
-        at = np.searchsorted(motions, self.row)
-        turning = np.flatnonzero(follows & turns[at])
-        side = np.where(self.before[turning, None], end[at[turning]], begin[at[turning]])
-        step[turning] -= share[turning, None] * side
-        last[turning] = step[turning]
-        mask = np.zeros(len(self.row), bool)
-        mask[turning] = True
-        return replace(self, step=step, end=last, share=share, turning=mask)
+        first = self.vertex - self.before  # the motion of the vertex, in whose frame the step is
+        some = np.flatnonzero(turning.turns[first])
+        row, first, before = self.row[some], first[some], self.before[some]
+        broken = np.append(np.flatnonzero(breaks), len(breaks))
+        stop = broken[np.searchsorted(broken, first, "right")]
+        begin = broken[np.searchsorted(broken, first, "right") - 1]
+        last = np.clip(row, begin, stop - 1)
+        stays = last != row
+
+        step = self.step[some].reshape(-1, 2, 3)
+        side = 1 * before
+        own = _ends(turning, first, side) @ np.swapaxes(step, 1, 2)
+
+        def at_end(side: Ints) -> Floats:
+            """(E', 6) the steps where the motions ``last`` start (``side`` 0) or end (1)."""
+            here = np.swapaxes(_ends(turning, last, side), 1, 2) @ own
+            beside = np.clip(last + 2 * side - 1, begin, stop - 1)
+            inner = np.flatnonzero(beside != last)
+            there = np.swapaxes(_ends(turning, beside[inner], 1 - side[inner]), 1, 2) @ own[inner]
+            here[inner] = 0.5 * (here[inner] + there)
+            return np.swapaxes(here, 1, 2).reshape(-1, 6)
+
+        far = at_end(1 - side)
+        near = np.where(stays[:, None], far, at_end(side))
+        steps, ends, on_arc = self.step.copy(), self.end.copy(), self.on_arc.copy()
+        known = np.isfinite((near + far).sum(axis=1))[:, None]
+        steps[some], ends[some] = np.where(known, near, steps[some]), np.where(known, far, ends[some])
+        on_arc[some] = turning.mask[row] & ~stays & known[:, 0]
+        return replace(self, step=steps, end=ends, on_arc=on_arc, turning=turning)
 
     @staticmethod
     def profile(row: Ints, share: Floats, rest: Floats, extent: Floats) -> Ramps:
@@ -159,7 +170,7 @@ class Ramps:
 
     def only(self, some: Bools) -> Ramps:
         """The parts ``some`` (E,)."""
-        return Ramps(*(getattr(self, one.name)[some] for one in fields(self)))
+        return replace(self, **{name: getattr(self, name)[some] for name in _COLUMNS})
 
     def places(self) -> tuple[Ints, Floats, Floats]:
         """Of profiles: the motions (P,), shares (P,) and wrenches (P, 6) that they were made of (see ``profile``)."""
@@ -168,17 +179,17 @@ class Ramps:
         share = np.concatenate([self.length / self.extent, np.zeros(len(motions))])
         order = np.lexsort((share, row))
         row, share = row[order], share[order]
-        return row, share, self.at(row, share, np.zeros((len(row), 6)))
+        return row, share, self.at(row, share)
 
     def joined(self, other: Ramps) -> Ramps:
         """Both, in their order."""
         order = np.argsort(np.concatenate([self.row, other.row]), kind="stable")
-        pairs = ((getattr(self, one.name), getattr(other, one.name)) for one in fields(self))
-        return Ramps(*(np.concatenate(pair)[order] for pair in pairs))
+        pairs = {name: (getattr(self, name), getattr(other, name)) for name in _COLUMNS}
+        turning = other.turning if self.turning is None else self.turning
+        return Ramps(**{name: np.concatenate(pair)[order] for name, pair in pairs.items()}, turning=turning)
 
-    def at(self, rows: Ints, share: Floats, wrench: Floats) -> Floats:
-        """(K, 6) what the ramps add to the new wrench ``wrench`` (K, 6) at the shares ``share`` (K,) of the motions
-        ``rows`` (K,)."""
+    def at(self, rows: Ints, share: Floats) -> Floats:
+        """(K, 6) what the ramps add to the new wrench at the shares ``share`` (K,) of the motions ``rows`` (K,)."""
         added = np.zeros((len(rows), 6))
         first = np.searchsorted(self.row, rows, "left")
         count = np.searchsorted(self.row, rows, "right") - first
@@ -188,10 +199,15 @@ class Ramps:
             ahead = np.where(self.before[part], 1.0 - share[some], share[some])[:, None]
             start, extent, length = (a[part, None] for a in (self.start, self.extent, self.length))
             step, end = self.step[part], self.end[part]
-            turned = np.where(self.turning[part], self.share[part], 0.0)[:, None] * wrench[some]
-            here = np.maximum(1.0 - (start + ahead * extent) / length, 0.0) * (step + turned)
+            here = np.maximum(1.0 - (start + ahead * extent) / length, 0.0)
             there = np.maximum(1.0 - (start + extent) / length, 0.0)
-            added[some] -= here + ahead * there * (end - step)
+            rest = here * step + ahead * there * (end - step)
+            arc = np.flatnonzero(self.on_arc[part])
+            if self.turning is not None and len(arc):
+                at, back = some[arc], self.before[part[arc], None]
+                begin, stop = np.where(back, end[arc], step[arc]), np.where(back, step[arc], end[arc])
+                rest[arc] = here[arc] * self.turning.along(rows[at], share[at], begin, stop)
+            added[some] -= rest
         return added
 
     def steps(self) -> tuple[Ints, Floats, Floats]:
@@ -211,3 +227,15 @@ class Ramps:
         share = np.where(self.before[inside], 1.0 - share, share)
         order = np.lexsort((share, row))
         return row[order], share[order]
+
+
+_COLUMNS = tuple(one.name for one in fields(Ramps) if one.name != "turning")
+
+
+def _ends(turning: Turning, rows: Ints, side: Ints) -> Floats:
+    """(K, 3, 3) the frames of the motions ``rows`` (K,) where they start (``side`` (K,) 0) or end (1)."""
+    frames = np.empty((len(rows), 3, 3))
+    for which in (0, 1):
+        some = np.flatnonzero(side == which)
+        frames[some] = turning.ends(rows[some], which)
+    return frames

@@ -115,7 +115,7 @@ class Wrenches:
         if self.ramps is None:
             return self.values
         rows, values = np.unique(self.ramps.row), self.values.copy()
-        values[rows] += self.ramps.at(rows, np.ones(len(rows)), self.values[rows])
+        values[rows] += self.ramps.at(rows, np.ones(len(rows)))
         return frozen(values)
 
     def largest_along(self, rows: Ints) -> Floats:
@@ -154,12 +154,10 @@ class Wrenches:
         if len(lead):
             ahead = early[lead, None] * step[lead]
             ramps = ramps.joined(Ramps.leading(rows[lead], ahead, length[lead], extent, carries))
-        ramps = ramps.following(rows, early, self._sides)
+        ramps = ramps.shared(rows, early)
+        if self.turning is not None:
+            ramps = ramps.turned(self.turning, self.turning.breaks() | self.steps | ~carries)
         return replace(self, steps=steps, ramps=ramps if self.ramps is None else self.ramps.joined(ramps))
-
-    def _sides(self, rows: Ints) -> tuple[Floats, Floats, Bools]:
-        turns = np.zeros(len(rows), bool) if self.turning is None else self.turning.mask[rows]
-        return self.start[rows], self.values[rows], turns
 
     def along(self, rows: Ints, fraction: Floats) -> Floats:
         """(K, 6) the wrench at the shares ``fraction`` (K,), 0 to 1, of the path of the motions ``rows`` (K,).
@@ -169,12 +167,11 @@ class Wrenches:
         """
         share = fraction[:, None]
         wrench = (1 - share) * self.start[rows] + share * self.values[rows]
-        if self.turning is not None:
-            turned = np.flatnonzero(self.turning.mask[rows])
+        if self.turning is not None and (turned := np.flatnonzero(self.turning.mask[rows])).size:
             at = rows[turned]
             wrench[turned] = self.turning.along(at, fraction[turned], self.start[at], self.values[at])
         if self.ramps is not None:
-            wrench += self.ramps.at(rows, fraction, wrench)
+            wrench += self.ramps.at(rows, fraction)
         return wrench
 
 
@@ -399,16 +396,19 @@ class _WrenchTurning:
         return np.asarray(turned.reshape(-1, 6))
 
     def turning(self, carries: Bools) -> Turning | None:
-        """The frames that turn along the path of arcs, where there are any."""
-        frame = self.stated.frames
+        """The frames that turn along the path, where there are any."""
+        frame, known = self.stated.frames, self.path_length.starts
+        turns = known & (frame == TOOL)
         framed = frame == TOOL
         if self.feed is not None:
+            turns |= known & (frame == FEED) & self.feed.matters & ~self.feed.undirected
             framed |= (frame == FEED) & (self.feed.matters | self.path_length.turns_along)
-        mask = carries & framed & self.path_length.arc & self.path_length.starts
-        if not mask.any():
+        mask = carries & framed & self.path_length.arc & known
+        if not (mask | (carries & turns)).any():
             return None
+        arc_turn = self.path_length.arc_turn
         return Turning(
-            mask, frame == FEED, self.feed, self.base_in_robot, self.tool_in_base, self.path_length.arc_turn
+            mask, frame == FEED, carries & turns, self.feed, self.base_in_robot, self.tool_in_base, arc_turn
         )
 
     def _turned(self, rows: Ints, values: Floats, side: int) -> Floats:

@@ -11,9 +11,9 @@ changes linearly over a ramp of total length r, half of it on each side (at most
 mean of both sides at the vertex.  A cut begins and ends with steps.
 
 That is the rule CENTRED.  By the rule AFTER the motion before a vertex keeps its force up to it, and the change goes
-over along r behind it: what acts is a mean of that force and of the one of the motion, by the part of r that is walked.
-Up to the next such vertex the mean is with the force of the place: exact on an arc in whose frame the force is stated,
-and straight between the ends of other motions; behind it by as much as at that vertex.
+over along r behind it.  What remains of the change there turns with the frame in which the force behind the vertex is
+stated, up to the next such vertex or another kind of frame, and stays behind: exactly on an arc; at other motions' ends
+the mean of both sides, as the wrench is, and straight in between, or by that at the last vertex where r ends there.
 
 By the rule STRETCHED, which the package states of its output and which is judged by, along r = max(ramp, d / 0.9)
 behind it: d is by how much the target that brings the tool to the vertex goes back along the feed there, from the force
@@ -68,7 +68,7 @@ class Field:
         self.begin, self.end = begin, end
         # ramps at the vertices that are left: their half, and the wrench in their middle
         step = np.flatnonzero(~smooth)
-        self.after: list[tuple[float, float, list[np.ndarray], int]] = []
+        self.after: list[tuple[float, float, int, np.ndarray, np.ndarray]] = []
         if rule != CENTRED:
             for k, following in zip(step, [*step[1:], len(end) - 1], strict=False):
                 reach, change = ramp, begin[k + 1] - end[k]
@@ -76,10 +76,11 @@ class Field:
                     moved = correct(low + k + 1, end[k]) - correct(low + k + 1, begin[k + 1])
                     feed = path.tangent(np.array([low + k + 1]), np.zeros(1))[0]
                     reach = max(ramp, moved @ feed / STEEPEST)
-                apart = [change]  # from the force that ends, at the ends of the motions up to the next step
-                for m in range(k + 1, following + 1):
-                    apart.append(apart[-1] + end[m] - begin[m])
-                self.after.append((path.start[low + k + 1], reach, apart, int(k + 1)))
+                first, until = int(k) + 1, int(following) + 1
+                kinds = self.frames[first:until]
+                if np.any(other := kinds != kinds[0]):
+                    until = first + int(np.argmax(other))
+                self.after.append((path.start[low + first], reach, first, *self._apart(change, first, until)))
             step = step[:0]
         lengths = path.length[self.rows]
         self.ramp = np.zeros((2, len(self.rows)))  # at the begin and at the end of each motion
@@ -152,18 +153,32 @@ class Field:
         jumps = change > np.maximum(JUMP * size, JUMP_OF_LARGEST * largest)
         return (cosine > np.cos(SMOOTH)) & ~jumps
 
-    def _plain(self, i: np.ndarray, share: np.ndarray) -> np.ndarray:
-        """(K, 6) along motions, as if no vertex had a ramp."""
+    def _apart(self, change: np.ndarray, first: int, until: int) -> tuple[np.ndarray, np.ndarray]:
+        """(until - first, 6) what a change (6,) where motion ``first`` begins is where motions begin and end."""
+        i = self.low + np.arange(first, until)
+        sides = [self._axes(i, np.full(len(i), t)) for t in (0.0, 1.0)]
+        if self.frames[first] in ("base", "world"):
+            sides = [np.broadcast_to(np.eye(3), (len(i), 3, 3))] * 2
+        own = change.reshape(2, 3) @ sides[0][0]
+        begin, end = (np.einsum("kij,pj->kpi", side, own).reshape(-1, 6) for side in sides)
+        begin[1:] = end[:-1] = 0.5 * (begin[1:] + end[:-1])
+        return begin, end
+
+    def _plain(
+        self, i: np.ndarray, share: np.ndarray, own: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> np.ndarray:
+        """(K, 6) along motions, as if no vertex had a ramp; ``own``: other wrenches (n, 6) than those at their ends."""
         k, t = i - self.low, share[:, None]
-        wrench = (1 - t) * self.begin[k] + t * self.end[k]
+        ends = (self.begin, self.end) if own is None else own
+        wrench = (1 - t) * ends[0][k] + t * ends[1][k]
         rows = np.flatnonzero(self.path.arc[i] & np.isin(self.frames[k], ("feed", "tool")))
         if len(rows):
             zero, one = np.zeros(len(rows)), np.ones(len(rows))
             first, here, last = (self._axes(i[rows], s) for s in (zero, share[rows], one))
             own = (1 - t[rows])[..., None] * np.einsum(
-                "kji,kpj->kpi", first, self.begin[k[rows]].reshape(-1, 2, 3)
+                "kji,kpj->kpi", first, ends[0][k[rows]].reshape(-1, 2, 3)
             )
-            own += t[rows][..., None] * np.einsum("kji,kpj->kpi", last, self.end[k[rows]].reshape(-1, 2, 3))
+            own += t[rows][..., None] * np.einsum("kji,kpj->kpi", last, ends[1][k[rows]].reshape(-1, 2, 3))
             wrench[rows] = np.einsum("kij,kpj->kpi", here, own).reshape(-1, 6)
         return wrench
 
@@ -179,22 +194,23 @@ class Field:
                 own = self.begin if side == 0 else self.end
                 change = self.middle[side, k[rows]] - own[k[rows]]
                 wrench[rows] += (1 - away[rows] / half[rows])[:, None] * change
-        for place, reach, apart, first in self.after:
+        for place, reach, first, begin, end in self.after:
             behind = label - place
             on = np.flatnonzero((behind >= 0) & (behind < reach))
             for m in np.unique(k[on]):
                 rows = on[k[on] == m]
                 part, t = (1 - behind[rows] / reach)[:, None], share[rows, None]
-                if m - first >= len(apart) - 1:
-                    wrench[rows] -= part * apart[-1]
-                elif self.path.arc[m + self.low] and self.frames[m] in ("feed", "tool"):
-                    changed = self._plain(i[rows], share[rows]) - self.begin[m]
-                    wrench[rows] -= part * (apart[m - first] + changed)
+                at = m + self.low
+                if m - first >= len(begin):
+                    wrench[rows] -= part * end[-1]
+                elif self.path.arc[at] and self.frames[m] in ("feed", "tool"):
+                    sides = np.zeros((2, len(self.rows), 6))
+                    sides[:, m] = begin[m - first], end[m - first]
+                    wrench[rows] -= part * self._plain(i[rows], share[rows], (sides[0], sides[1]))
                 else:
                     since, until = (
-                        1 - (self.path.start[m + self.low] - place + at) / reach
-                        for at in (0.0, self.path.length[m + self.low])
+                        1 - (self.path.start[at] - place + x) / reach for x in (0.0, self.path.length[at])
                     )
-                    straight = (1 - t) * since * apart[m - first] + t * until * apart[m - first + 1]
-                    wrench[rows] -= straight if until > 0 else part * apart[m - first]
+                    straight = (1 - t) * since * begin[m - first] + t * until * end[m - first]
+                    wrench[rows] -= straight if until > 0 else part * begin[m - first]
         return wrench
