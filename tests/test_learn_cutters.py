@@ -8,7 +8,7 @@ from blind_parts.shop import write_shop
 
 from postproc.base.findings import Refusal
 from postproc.base.geometry import Poses
-from postproc.learning.ball_displacement import BallDisplacement
+from postproc.learning.surface_displacement import SurfaceDisplacement
 from postproc.workflows.learn_points import read_job
 from postproc.workflows.preparation import Request
 
@@ -74,7 +74,9 @@ def test_a_ball_with_its_tip_in_place_moves_the_surface_by_its_lean():
         row=np.arange(count), normal=normal, spindle=spindle, point=contact, to_contact=contact - tip
     )
     zero = np.zeros(2 * count, int)
-    ball = BallDisplacement({1: more}, zero + 1, np.repeat([0, 1], count), points)
+    ball = SurfaceDisplacement(
+        {1: more}, (1,), zero + 1, np.repeat([0, 1], count), np.ones(2 * count, bool), points
+    )
     poses = Poses(np.tile(np.eye(3), (count, 1, 1)), tip)
     moved = ball.at(np.arange(count), poses)
     deeper = depth(radius + more) - depth(radius)

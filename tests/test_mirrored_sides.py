@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import postproc
-from postproc.learning.next_program import wall_sides
+from postproc.learning.measured_walls import measured_walls
 from postproc.workflows.preparation import Request, prepare
 
 TOOL, WIDTH, DEPTH, TEETH, HELIX = 16.0, 4.0, 4.0, 3, 1
@@ -198,8 +198,8 @@ def test_a_learnt_side_of_walls_is_that_of_the_programmed_side():
         spindle=np.tile([0.0, 0.0, -1.0], (2, 1)),
         normal=np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]),  # out of the material at y < 0, and mirrored
     )
-    result = SimpleNamespace(prediction=SimpleNamespace(points=points))
     path = SimpleNamespace(tangent=lambda rows, share: np.tile([1.0, 0.0, 0.0], (len(rows), 1)))
     operations = SimpleNamespace(names=("OP",), which=np.zeros(2, int))
-    sides = wall_sides(result, path, operations, np.ones(2, int), (), np.array([1, -1]))
-    assert sides == {"OP": 1}  # right of a feed along x, seen from above, is y < 0
+    ones = np.ones(2, int)
+    found = measured_walls(points, path, operations, ones, (), np.array([1, -1]), ones > 0)
+    assert found.sides == {"OP": 1}  # right of a feed along x, seen from above, is y < 0

@@ -33,8 +33,9 @@ class ToolDisplacement(KnownError):
     its end; a cut along the spindle is moved as the cut that it leads to, or comes from.
 
     spindle (N, 3): unit vectors in tool axes; tool (N,): its number; length: number of a tool -> dl [m]; radius: of a
-    tool -> dr [m]; side: tool and operation -> s as programmed; hand (N,): 1, -1 where that is mirrored, 0 where it is
-    not known; None where it is 1; cuts (N,): motions that cut, None where none is known to meet another one.
+    tool -> dr [m]; side: tool and operation -> s as programmed; motion_side (N,): s of single motions, 0 where that of
+    the operation counts, None where it always does; hand (N,): 1, -1 where s is mirrored, 0 where it is not known; None
+    where it is 1; cuts (N,): motions that cut, None where none is known to meet another one.
     """
 
     path: DesiredPath
@@ -46,6 +47,7 @@ class ToolDisplacement(KnownError):
     side: Mapping[tuple[int, str], int] = field(default_factory=dict)
     hand: Ints | None = None
     cuts: Bools | None = None
+    motion_side: Ints | None = None
 
     def at(self, rows: Ints, wanted: Poses, share: Floats | None = None) -> Floats:
         """(K, 3) [m] of motions ``rows`` (K,) at ``wanted`` (K) poses, at ``share`` (K,) of their paths."""
@@ -112,8 +114,11 @@ class ToolDisplacement(KnownError):
         """(K,) [m] s dr."""
         size = np.zeros(len(rows))
         for number, radius in self.radius.items():
-            sides = np.array([self.side.get((number, name), 0) for name in self.operations.names])
-            size += np.where(tool == number, radius * sides[self.operations.which[rows]], 0.0)
+            by_name = np.array([self.side.get((number, name), 0) for name in self.operations.names])
+            sides = by_name[self.operations.which[rows]]
+            if self.motion_side is not None:
+                sides = np.where(self.motion_side[rows] != 0, self.motion_side[rows], sides)
+            size += np.where(tool == number, radius * sides, 0.0)
         return size if self.hand is None else size * self.hand[rows]
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from postproc.base.arrays import Floats, Ints
 from postproc.cell.tool_errors import ToolError
 from postproc.effects.gravity_compensator import GravityCompensator
+from postproc.learning.surface_displacement import radius_share
 from postproc.learning.touched_points import TouchedPoints
 from postproc.model import StiffnessModel
 from postproc.process.force_factors import axes_across
@@ -276,10 +277,9 @@ def tool_causes(
     """
     causes = []
     along = np.sum(points.normal * points.spindle, axis=1)
-    across = np.sqrt(np.maximum(1.0 - along**2, 0.0))
     for tool in np.unique(number).tolist():
         own, known = (number == tool).astype(float), stated.get(tool, ToolError())
-        radial = own * ((1.0 + along) if tool in ball else across)
+        radial = own * radius_share(points.normal, points.spindle, tool in ball)
         for name, weight, value, ci95, usual in (
             ("radius", -radial, known.radius, known.radius_ci95, 2 * RADIUS if spring else RADIUS),
             ("length", own * along, known.length, known.length_ci95, LENGTH),

@@ -190,5 +190,13 @@ CODES = define(
             action="Remove the cause that the other finding names, or keep the program that cut the measured part.",
             example="A cut on which a wide gap of an axis changes its side (COR016).",
         ),
+        "LRN024": Code(
+            "warning",
+            "radius of a tool stays uncorrected",
+            meaning="One position of the tool leaves surfaces that a larger radius moves in opposite directions.",
+            consequence="The part keeps that error of the radius there; the promise includes it.",
+            action="Set the radius of the tool in control and CAM, or use a tool of the programmed size.",
+            example="A slot that is cut as wide as the tool.",
+        ),
     }
 )

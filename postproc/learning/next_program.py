@@ -8,7 +8,6 @@ at this place only, the smooth displacement that no cause explains.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,10 +19,9 @@ from postproc.compensation.desired_path import DesiredPath
 from postproc.compensation.known_error import KnownError
 from postproc.compensation.tool_displacement import ToolDisplacement
 from postproc.learning.attribution import Attribution
-from postproc.learning.ball_displacement import BallDisplacement
 from postproc.learning.causes import CauseKind
+from postproc.learning.surface_displacement import SurfaceDisplacement
 from postproc.process.force_factors import ForceFactors
-from postproc.process.operation_names import OperationNames
 from postproc.process.wrenches import Wrenches
 from postproc.toolpath import Toolpath
 
@@ -32,12 +30,6 @@ ROUNDED = 2 * MM
 
 _REACH = 0.75, 1.25
 """Radii of the cutter from a turn of the feed within which its force begins and ends to feel it."""
-
-_FLAT = 0.1
-"""Cosine of the angle to the spindle below which a surface is a wall, and above 1 less which it is a floor."""
-
-_SIDE = 0.9
-"""Share of the points of an operation that have to lie on one side of the feed."""
 
 
 def force_factors(result: Attribution) -> ForceFactors:
@@ -96,13 +88,13 @@ def corner_size(result: Attribution) -> float:
 class LearnedError(KnownError):
     """What was learnt of a part beside robot and forces.
 
-    tool: longer and thicker tools; ball: those with a ball of another radius; base (6,): shift [m] and turn [rad] about
-    ``centre`` (3,) in the axes (3, 3) of the base; drift (3,) [m] over the whole program, with ``time`` (N,) 0..1;
-    corners: where the force is larger there."""
+    tool: longer and thicker tools; surface: what their radius does to surfaces that lean; base (6,): shift [m] and turn
+    [rad] about ``centre`` (3,) in the axes (3, 3) of the base; drift (3,) [m] over the whole program, with ``time``
+    (N,) 0..1; corners: where the force is larger there."""
 
     result: Attribution
     tool: ToolDisplacement
-    ball: BallDisplacement
+    surface: SurfaceDisplacement
     base: Floats = field(default_factory=lambda: np.zeros(6))
     centre: Floats = field(default_factory=lambda: np.zeros(3))
     axes: Floats = field(default_factory=lambda: np.eye(3))
@@ -114,7 +106,7 @@ class LearnedError(KnownError):
         """(K, 3) [m] of motions ``rows`` (K,) at ``wanted`` (K) poses, at ``share`` (K,) of their paths."""
         along = np.ones(len(rows)) if share is None else share
         moved = self.result.field_at(wanted.position) + self.tool.at(rows, wanted, along)
-        moved += self.ball.at(rows, wanted)
+        moved += self.surface.at(rows, wanted)
         if self.base.any():
             place = (wanted.position - self.centre) @ self.axes
             moved += (self.base[:3] + np.cross(self.base[3:], place)) @ self.axes.T
@@ -128,15 +120,15 @@ class LearnedError(KnownError):
 
 def learned_error(
     result: Attribution,
-    tool: tuple[ToolDisplacement, BallDisplacement],
+    tool: tuple[ToolDisplacement, SurfaceDisplacement],
     rigid: tuple[Floats, Floats],
     time: Floats,
     corners: CornerError | None,
 ) -> LearnedError:
     """The known error of an attribution.
 
-    tool: as it was learnt, with a flat end and with a ball; rigid: centre (3,) [m] and axes (3, 3) of the base; time
-    (N,) 0..1; corners: where a force in corners was learnt.
+    tool: as it was learnt, beside walls and on surfaces that lean; rigid: centre (3,) [m] and axes (3, 3) of the base;
+    time (N,) 0..1; corners: where a force in corners was learnt.
     """
     base, drift = np.zeros(6), np.zeros(3)
     for cause, value in zip(result.causes, result.x.tolist(), strict=True):
@@ -145,37 +137,6 @@ def learned_error(
         elif cause.kind is CauseKind.SHIFT and cause.place == "drift":
             drift["xyz".index(cause.parameter)] = value
     return LearnedError(result, *tool, base, *rigid, drift, time, corners)
-
-
-def wall_sides(
-    result: Attribution,
-    path: DesiredPath,
-    operations: OperationNames,
-    tool: Ints,
-    ball: Sequence[int],
-    hand: Ints,
-) -> dict[str, int]:
-    """Operation -> side of the feed, 1: right, -1: left, seen along the spindle towards the tip, on which its measured
-    walls lie as programmed, where that is one; tool (N,): numbers; of tools with a ``ball`` only where no surface is
-    inclined, as their radius acts less there; hand (N,): as of ``ToolDisplacement``."""
-    points = result.prediction.points
-    tangent = path.tangent(points.row, points.share)
-    across = np.cross(points.spindle, tangent)
-    # the material is where the outward normal comes from
-    towards = -np.sum(across * points.normal, axis=1) * hand[points.row]
-    wall = np.abs(towards) > 0.5
-    along = np.abs(np.sum(points.spindle * points.normal, axis=1))
-    inclined = np.isin(tool[points.row], ball) & (along > _FLAT) & (along < 1 - _FLAT)
-    sides = {}
-    for index, name in enumerate(operations.names):
-        of_it = operations.which[points.row] == index
-        own = wall & of_it
-        if own.any() and not (inclined & of_it).any():
-            sign = np.sign(towards[own])
-            mean = float(sign.mean())
-            if abs(mean) >= 2 * _SIDE - 1:
-                sides[name] = 1 if mean > 0 else -1
-    return sides
 
 
 @dataclass(frozen=True, eq=False)

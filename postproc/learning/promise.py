@@ -41,17 +41,23 @@ class Promise:
         """Whether the next part is expected to be better by more than it may be worse."""
         return self.after < 0.9 * self.before
 
+    def with_remaining(self, error: Floats, free: Floats) -> Promise:
+        """The same where ``error`` (J,) [m] of the places of the part that was cut last stays beside what is not known;
+        free (J, A): freedoms of the alignment."""
+        left = float(np.sqrt(np.mean(aligned(error, alignment_basis(free)) ** 2)))
+        ends = ((self.after, 1.0), (self.lower, 1.0 - STAYS), (self.upper, 1.0 + STAYS))
+        after, lower, upper = (float(np.hypot(end, by * left)) for end, by in ends)
+        return Promise(self.before, after, lower, upper)
+
     def with_uncorrected(self, error: Floats, corrected: Bools, free: Floats) -> Promise:
         """The same of a program that does not correct all places (J,) of the part that was cut last: ``error`` (J,) [m]
         of those that are not ``corrected`` (J,) stays; free (J, A): freedoms of the alignment.
 
             after^2 = share of corrected places * after^2 + mean(stays^2)
         """
-        stays = aligned(np.where(corrected, 0.0, error), alignment_basis(free))
-        left, share = float(np.sqrt(np.mean(stays**2))), float(np.mean(corrected))
-        ends = ((self.after, 1.0), (self.lower, 1.0 - STAYS), (self.upper, 1.0 + STAYS))
-        after, lower, upper = (float(np.hypot(np.sqrt(share) * end, by * left)) for end, by in ends)
-        return Promise(self.before, after, lower, upper)
+        share = np.sqrt(float(np.mean(corrected)))
+        less = Promise(self.before, share * self.after, share * self.lower, share * self.upper)
+        return less.with_remaining(np.where(corrected, 0.0, error), free)
 
 
 def promise(result: Attribution, last: Bools, gain: float = 1.0) -> Promise:

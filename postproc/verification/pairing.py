@@ -151,7 +151,10 @@ def _extras(
                 best[more] = min(earlier)
         if not best:
             line = int(original.toolpath.line[min(stretches.stop[here], len(original.toolpath) - 1)])
-            raise Different("no motion of the second program leads to where this one leads", line)
+            near = f"{original.max_correction / MM:g} mm (max_correction of the cell)"
+            raise Different(
+                f"no motion of the second program leads within {near} of where this one leads", line
+            )
         before = best
     _, path = min(before.values())
     return np.array([*path, extra])

@@ -16,12 +16,10 @@ from postproc.base.read_files import read_file
 from postproc.base.system import relative_path
 from postproc.base.units import MM
 from postproc.learning.attribution import Attribution, attribute
-from postproc.learning.ball_displacement import BallDisplacement
 from postproc.learning.causes import CausePrediction, PriorKnowledge
 from postproc.learning.copied_parts import refuse_copied_parts
 from postproc.learning.history import RecordedStep
 from postproc.learning.measured_part import MeasuredPart, read_measured_part
-from postproc.learning.next_program import force_factors, learned_error, wall_sides
 from postproc.learning.other_readings import StatedPart, check_readings
 from postproc.learning.plausible import FirstLook, check_deviations, check_explained, scatter_findings
 from postproc.learning.promise import Promise, measured_rms, promise
@@ -29,14 +27,11 @@ from postproc.learning.push_test import with_push_test
 from postproc.learning.unobserved import indistinct
 from postproc.measurements import read_measurements
 from postproc.output.atomic_write import replace_file, write_atomically
-from postproc.process import Wrenches
 from postproc.report.learned import Learned, LearnedPart, learned_csv
 from postproc.report.report import Report, exit_code, in_order_of_place, json_bytes
 from postproc.robot.description import robot_of
-from postproc.workflows.cell_tool_errors import tool_displacement
 from postproc.workflows.kinds import PART, check_kind
 from postproc.workflows.learn_commands import cutting_file
-from postproc.workflows.learn_corners import corner_error
 from postproc.workflows.learn_history import (
     Remembered,
     keep_program,
@@ -45,10 +40,11 @@ from postproc.workflows.learn_history import (
     record_step,
     remember,
 )
+from postproc.workflows.learn_inputs import learned_inputs, tool_remains, walls_of
 from postproc.workflows.learn_points import CutProgram, Matched, match, read_job
 from postproc.workflows.learn_robot import force_factor_lines, learned_robot_file
-from postproc.workflows.learn_tool import MeasuredWalls, tool_and_base_findings, tool_error_lines, tool_errors
-from postproc.workflows.preparation import LearnedInputs, Request, Stage, silent
+from postproc.workflows.learn_tool import tool_and_base_findings, tool_error_lines
+from postproc.workflows.preparation import Request, Stage, silent
 from postproc.workflows.program import compensate
 
 SHOWN = 5
@@ -140,7 +136,9 @@ def _learn(request: LearnRequest, stage: Stage) -> Learned:
     wrong += [one for one in readings if one.severity == "error"]
     if wrong:
         raise Refusal(*wrong)
-    promised = promise(result, matched.file == len(parts) - 1, request.gain)
+    last = matched.file == len(parts) - 1
+    promised = promise(result, last, request.gain)
+    promised, remains = tool_remains(job, matched, result.damped(request.gain), last, promised)
     history = _history(parts, programs, remembered, matched, result)
     findings = [*(f for part in parts for f in part.findings), *job.findings, *matched.findings]
     findings += [
@@ -148,6 +146,7 @@ def _learn(request: LearnRequest, stage: Stage) -> Learned:
         *remembered.findings,
         *_findings(parts, matched, result, promised),
         *_unkept(parts, history),
+        *remains,
     ]
     lines = f"{main.program.stem}.tool_errors.yaml"
     findings += tool_and_base_findings(result, file, lines)
@@ -289,35 +288,6 @@ def _no_better(promised: Promise, file: str) -> Finding:
     return Finding("LRN009", message, file)
 
 
-def _walls(result: Attribution, job: CutProgram) -> MeasuredWalls:
-    task, path, names = job.ready.task, job.ready.task.toolpath, np.array(job.operations.names)
-    hand = path.reflections.sides(path.rotation, job.spindle)
-    sides = wall_sides(result, task.desired_path, job.operations, job.tool, job.ball, hand)
-    cut = {
-        number: job.operations.which[task.carries & (job.tool == number)] for number in np.unique(job.tool)
-    }
-    return MeasuredWalls(sides, {int(k): frozenset(names[which].tolist()) for k, which in cut.items()})
-
-
-def _learned_inputs(job: CutProgram, matched: Matched, result: Attribution) -> LearnedInputs:
-    """What the main job is given beside the robot file."""
-    task, factors = job.ready.task, force_factors(result)
-    base = task.base[np.arange(len(task.toolpath))].rotation
-
-    def forces(stated: Wrenches) -> Wrenches:
-        return factors.acting(stated, job.operations, base)
-
-    rigid = matched.centre, matched.axes
-    corners = corner_error(job, result, forces(task.force))
-    errors = tool_errors(result, job.ready.cell, _walls(result, job))
-    flat = {k: replace(one, radius=0.0) if k in job.ball else one for k, one in errors.items()}
-    tool = tool_displacement(flat, task, job.spindle, job.tool, job.operations)
-    radius = {k: one.radius for k, one in errors.items() if k in job.ball and one.radius}
-    ball = BallDisplacement(radius, job.tool, job.operations.which, result.prediction.points)
-    error = learned_error(result, (tool, ball), rigid, job.time, corners)
-    return LearnedInputs(forces, error)
-
-
 def _published(
     request: LearnRequest,
     job: CutProgram,
@@ -341,13 +311,13 @@ def _published(
         files[robot_path] = content
     if factors:
         files[folder / f"{main.program.stem}.force_factors.yaml"] = factors
-    if tools := tool_error_lines(result, parts, job.ready.cell, _walls(result, job)):
+    if tools := tool_error_lines(result, parts, job.ready.cell, walls_of(result, job)):
         files[folder / f"{main.program.stem}.tool_errors.yaml"] = tools
     own = folder / f"{main.program.stem}.learned.json"
     extra = [path for path in (request.csv, request.page, request.json) if path is not None]
     _spare(request, job, parts, [*files, own, *extra, remembered.path])
     applied = result.damped(request.gain)
-    inputs = _learned_inputs(job, matched, applied)
+    inputs = learned_inputs(job, matched, applied)
     acting = content
     if request.gain != 1.0 or result.stand_in:
         acting = learned_robot_file(applied, robot, parts, gap, robot_path, at_this_place=True) or content

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 
 from postproc.base.findings import Finding
@@ -13,6 +13,7 @@ from postproc.cell.tool_errors import OTHERS, SIZES, WALL_SIDES, ToolError
 from postproc.learning.attribution import Attribution
 from postproc.learning.causes import Cause
 from postproc.learning.measured_part import MeasuredPart
+from postproc.learning.measured_walls import MeasuredWalls
 from postproc.robot.description import COVERAGE
 from postproc.workflows.learn_robot import is_observed
 
@@ -23,19 +24,6 @@ def _measured(result: Attribution, group: str) -> Iterator[tuple[Cause, float, f
     """Causes of a group, each with what was learnt and its standard deviation, in its own unit."""
     every = zip(result.causes, result.x.tolist(), result.deviations.tolist(), strict=True)
     return (one for one in every if one[0].group == group)
-
-
-@dataclass(frozen=True)
-class MeasuredWalls:
-    """``sides``: operation -> -1 or 1, where its measured walls lie; ``operations``: tool -> those that it cuts."""
-
-    sides: Mapping[str, int]
-    operations: Mapping[int, frozenset[str]]
-
-    def of(self, tool: int) -> dict[str, int]:
-        """``sides`` of the operations that a tool cuts."""
-        own = self.operations.get(tool, frozenset())
-        return {name: side for name, side in self.sides.items() if name in own}
 
 
 def tool_errors(result: Attribution, cell: Cell, walls: MeasuredWalls) -> dict[int, ToolError]:
@@ -92,9 +80,18 @@ def tool_error_lines(
         lines.append(
             f"  {number}: {{{', '.join(words)}" + (f", walls: {{{sides_of}}}}}" if sides_of else "}")
         )
-        open_ones = sorted(measured.operations.get(number, frozenset()) - set(walls[number]))
-        if open_ones and OTHERS not in walls[number] and any("radius:" in word for word in words):
-            rest = ", ".join(f'"{name}": none' for name in open_ones)
+        if not any("radius:" in word for word in words):
+            continue
+        own = measured.operations.get(number, frozenset())
+        several = own & (measured.both | measured.leaning)
+        if several:
+            quoted = ", ".join(f'"{name}"' for name in sorted(several))
+            lines.append(
+                f"  # no one side is right for these, with walls on both or surfaces that lean: {quoted}"
+            )
+        open_ones = own - set(walls[number]) - several
+        if open_ones and OTHERS not in walls[number]:
+            rest = ", ".join(f'"{name}": none' for name in sorted(open_ones))
             lines.append(f"  # no wall was measured of these: if they cut none, add to walls: {rest}")
     return ("\n".join(lines) + "\n").encode()
 
