@@ -375,3 +375,28 @@ def test_a_tcp_mode_means_the_same_where_rotary_words_turn_the_part() -> None:
         read("fanuc", text, options=options).toolpath for options in ({"rotary_words": "part"}, {})
     )
     np.testing.assert_array_equal(part.rotation[-1], plain.rotation[-1])
+
+
+@pytest.mark.parametrize("name", ["sinumerik", "fanuc"])
+def test_a_jump_to_a_block_number_that_no_block_has_leads_nowhere(name: str) -> None:
+    """GOTOC goes on; any other one is an alarm, so that what is after it runs only where the jump does not."""
+    body = "G1 X1. Y0. Z0.\n{}\nX2.\nN60 Y3.\nM30\n"
+    plain = run(name, body.format("G4 F1" if name == "sinumerik" else "G4 X1."))
+    condition = "IF $A_IN[1]==1 " if name == "sinumerik" else "IF [#1001 EQ 1] "
+    jumps = ["GOTO N900" if name == "sinumerik" else "GOTO 900"]
+    jumps += ["GOTOF N900", "GOTOB N0900", "GOTOC N900"] if name == "sinumerik" else []
+    for jump in jumps:
+        assert run(name, body.format(condition + jump)) == plain, jump
+        assert (run(name, body.format(jump)) == plain) == (jump == "GOTOC N900"), jump
+    assert run(name, body.format(condition + jumps[0].replace("900", "60"))) != plain
+
+
+def test_a_jump_to_a_name_that_is_no_label_may_be_one_to_what_a_variable_names() -> None:
+    body = "G1 X1 Y0 Z0\nIF $A_IN[1]==1 {}\nX2\nTHERE: Y3\nM30\n"
+    assert run("sinumerik", body.format("GOTOC THERE")) == run("sinumerik", body.format("GOTOF THERE"))
+    assert all("*" in end or "?" in end for end in run("sinumerik", body.format("GOTOC ELSEWHERE")))
+
+
+def test_a_jump_to_a_computed_block_number_is_not_missed() -> None:
+    body = "R1=900\nG1 X1 Y0 Z0\nIF $A_IN[1]==1 GOTOF N900\nX2\nN=R1 Y3\nM30\n"
+    assert any("*" in end or "?" in end for end in run("sinumerik", body))

@@ -95,3 +95,35 @@ def test_what_is_assigned_in_a_block_that_a_switch_leaves_out_is_not_known(switc
     text = f"G21 G90 G17 G54 T1\n{mode}G0 X0. Y0. Z0.\nF600\n#1=4.\n{switch}#1=9.\nG1 X#1\nM30\n"
     last = read(text, "linuxcnc").toolpath.position[-1, 0] * 1e3
     assert np.isnan(last) if switch else last == pytest.approx(9.0)
+
+
+MODES_NOT_READ = {
+    "G54.2 P1": (), "G54.4 P1": (), "G51.2 P1 Q2": (), "G7": (), "G107": (), "G7.1 C20.": (),
+    "G12.1": ("G13.1", "G113"), "G112": ("G13.1", "G113"),
+}  # fmt: skip
+"""A mode whose coordinates are not read, and the codes that end it."""
+OF_OTHERS = (
+    "G13.1", "G113", "G43 H1", "G43.4 H1", "G49", "G40", "G69", "G54", "G50.1 X0.", "G50", "G15", "G80", "G54.2 P0",
+    "G54.4 P0", "M6 T1", "G94",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("other", OF_OTHERS)
+@pytest.mark.parametrize("mode", MODES_NOT_READ)
+def test_a_mode_that_is_not_read_ends_with_no_code_of_another_one(mode: str, other: str) -> None:
+    text = (
+        f"G21 G90 G17 G94 T1 M6\nG54\nG43 H1\nG1 X1. Y1. Z1. F100.\n{{}}\n{other}\nG43 H1\nG1 X5. Y5. Z5.\n"
+    )
+    path = read(text.format(mode), "fanuc").toolpath
+    last = len(path) - 1
+    assert (last not in path.constraints.refused) == (other in MODES_NOT_READ[mode])
+    assert last not in read(text.format("G1"), "fanuc").toolpath.constraints.refused or other == "G113"
+
+
+@pytest.mark.parametrize("block", ["G54.2 P0", "G54.4 P0.", "G1 X2. G54.2 P0"])
+def test_no_offset_that_turns_with_a_table_changes_nothing(block: str) -> None:
+    text = f"G21 G90 G17 G94 T1 M6\nG54\nG43 H1\nG1 X1. Y1. Z1. F100.\n{block}\nY5.\n"
+    program = read(text, "fanuc")
+    assert not program.toolpath.constraints.refused
+    assert {finding.code for finding in program.findings} == set()
+    assert len(read(text.replace("P0", "P2"), "fanuc").toolpath.constraints.refused) >= 1

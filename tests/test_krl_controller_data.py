@@ -10,9 +10,9 @@ import pytest
 from conftest import LINES
 
 from postproc.base.document import Document
-from postproc.base.geometry import abc_from_rotation, rotation_from_abc
+from postproc.base.geometry import Poses, abc_from_rotation, rotation_from_abc
 from postproc.base.units import DEG, MM
-from postproc.cell import load_cell
+from postproc.cell import Cell, Tool, frames_of, load_cell
 from postproc.languages.dialect import Program, ReadingSettings
 from postproc.languages.krl import KrlDialect
 from postproc.languages.krl.spatial import product
@@ -105,7 +105,13 @@ def test_a_program_starts_with_the_state_of_the_cell() -> None:
         ("$BASE=TOOL_DATA[2]:{X 7,Y 0,Z 0,A 0,B 0,C 0}\n", "base ?"),
         ("$BASE=INV_POS(BASE_DATA[2])\n", "base ?"),
         ("BASE_DATA[2].X=5\n$BASE=BASE_DATA[2]:{X 7,Y 0,Z 0,A 0,B 0,C 0}\n", "base ?"),
-        ("$BASE=BASE_DATA[2]:{X 7,Y 0,Z 0,A 0,B 0,C 0}\n$BASE.X=3\n", "base ?"),
+        ("$BASE=BASE_DATA[2]:{X 7,Y 0,Z 0,A 0,B 0,C 0}\n$BASE.X=3\n", "base [2]{7 0 0 0 0 0}.X=3"),
+        ("BAS(#BASE,2)\n$BASE.Z=n+150\n", "base ?"),
+        ("n=1\nBAS(#BASE,2)\n$BASE.Z=n+150\n$BASE.Y=2\n$BASE.Z=151.5\n", "base [2]{0 0 0 0 0 0}.Y=2.Z=151.5"),
+        ("BAS(#BASE,2)\n$BASE.X=3\nMINE=$BASE\n$BASE=MINE\n", "base ?"),
+        ("BAS(#BASE,2)\n$BASE.A=3\n", "base ?"),
+        ("BAS(#BASE,2)\n$BASE.X=3\nBAS(#BASE,2)\n", "base [2]"),
+        ("BAS(#BASE,2)\nIF $IN[1] THEN\n$BASE.X=3\nENDIF\n", "base ?"),
         ("MINE=BASE_DATA[2]:{X 7,Y 0,Z 0,A 0,B 0,C 0}\n$BASE=MINE.X\n", "base ?"),
         ("IF BASE_DATA[2]==BASE_DATA[2] THEN\n$BASE=$NULLFRAME\nELSE\nBAS(#BASE,2)\nENDIF\n", "base ?"),
         (
@@ -167,3 +173,35 @@ def test_a_frame_in_an_entry_is_corrected_as_the_product_of_both(compensate, job
         if one.startswith(b"LIN"):
             pairs = (re.findall(rb"-?\d+\.\d+", each) for each in (one, two))
             np.testing.assert_allclose(*[np.array(each, float) for each in pairs], atol=0.0021)
+
+
+TOOLS = {
+    1: Poses.from_abc([0.01, -0.02, 0.3], [0.3, -0.2, 1.5]),
+    4: Poses.from_abc([1.0, 2.0, 3.0], [0.1, 0.2, 0.3]),
+}
+
+
+@pytest.mark.parametrize("number", TOOLS)
+@pytest.mark.parametrize("key", "XYZ")
+@pytest.mark.parametrize("within", ["", ":{X 10,Y 20,Z 30,A 40,B 50,C 60}"])
+def test_a_component_that_a_program_sets_of_a_frame_of_the_cell_replaces_that_of_the_cell(
+    number: int, key: str, within: str
+) -> None:
+    """The same motion with the whole frame as numbers has the same place."""
+    cell = Cell(
+        Path("cell.yaml"), "r", tools={n: Tool(pose, np.array([1.0, 0, 0])) for n, pose in TOOLS.items()}
+    )
+
+    def placed(frame: str, changed: str) -> Poses:
+        text = f"DEF a()\n$BASE=$NULLFRAME\n$TOOL={frame}\n{changed}LIN {{X 1,Y 2,Z 3,A 4,B 5,C 6}}\nEND\n"
+        path = KrlDialect().read((Document(Path("a.src"), text.encode()),)).toolpath
+        return frames_of(cell, path, "a.src").tool_in_flange
+
+    pose = cell.tools[number].pose
+    values = [*(pose.position / MM), *(abc_from_rotation(pose.rotation) / DEG)]
+    literal = ",".join(f"{name} {value!r}" for name, value in zip("XYZABC", map(float, values), strict=True))
+    by_entry = placed(f"TOOL_DATA[{number}]{within}", f"$TOOL.{key}=12.5\n")
+    by_numbers = placed(f"{{{literal}}}{within}", f"$TOOL.{key}=12.5\n")
+    assert np.allclose(by_entry.position, by_numbers.position, atol=1e-12)
+    assert np.allclose(by_entry.rotation, by_numbers.rotation, atol=1e-12)
+    assert by_entry.position[0, "XYZ".index(key)] == 0.0125

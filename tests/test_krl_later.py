@@ -38,8 +38,9 @@ CHANGES = {
     "world": ("$WORLD.X=5\n", f"LIN {FULL} C_DIS\n"),
     "table": (f"BASE_DATA[2]={MOVED}\n", f"BASE_DATA[2]={FULL}\n$BASE=BASE_DATA[2]\nLIN {FULL} C_DIS\n"),
     "variable": ("P.X=9\n", "LIN P C_DIS\n"),
+    "record": ("FDAT_ACT=FHOME\n", f"LIN {FULL} C_DIS\n"),
 }
-SPEED = {"feed": "$VEL.CP=0.7\n", "approximation": "$APO.CDIS=9\n"}
+SPEED = {"feed": "$VEL.CP=0.7\n", "approximation": "$APO.CDIS=9\n", "advance run": "$ADVANCE=0\n"}
 
 
 @pytest.mark.parametrize("change", CHANGES)
@@ -180,3 +181,65 @@ def test_what_a_function_may_change_under_another_name_is_not_claimed(given: str
         "DEFFCT REAL grow(x:OUT)\nREAL x\nx=9\nRETURN 1\nENDFCT\n"
     )
     assert bool(read(text, sub=body).toolpath.known[-1]) is (given == "r,3")
+
+
+SETTING = {
+    "trigger": "TRIGGER WHEN DISTANCE=0 DELAY=0 DO {}\n",
+    "path trigger": "TRIGGER WHEN PATH=5 DELAY=10 DO {}\n",
+    "interrupt": "INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO {}\nINTERRUPT ON 3\n",
+    "assignment": "{}\n",
+}
+
+
+@pytest.mark.parametrize("how", SETTING)
+@pytest.mark.parametrize(
+    ("variable", "is_reported"), [("$TECH[1].MODE=#CYCLE", True), ("$OUT[3]=TRUE", False)]
+)
+def test_a_variable_of_unknown_effect_is_reported_however_it_is_set(
+    how: str, variable: str, is_reported: bool
+) -> None:
+    program = read(f"{HEAD}LIN {FULL}\n{SETTING[how].format(variable)}LIN {FULL}\nEND\n")
+    codes = [finding.code for finding in program.findings]
+    assert codes.count("KRL037") == is_reported
+
+
+@pytest.mark.parametrize(
+    ("statement", "routine", "siblings"),
+    [
+        ("change($TECH.CLASS)\n", "DEF change(A:OUT)\nINT A\nA=1\nEND\n", {}),
+        (
+            "IF change($TECH.CLASS) THEN\nENDIF\n",
+            "DEFFCT BOOL change(A:OUT)\nINT A\nA=1\nRETURN TRUE\nENDFCT\n",
+            {},
+        ),
+        (WHEN["trigger"].format("change($TECH.CLASS)"), "DEF change(A:OUT)\nINT A\nA=1\nEND\n", {}),
+        ("change($TECH.CLASS)\n", "", {"change": "DEF change(A:OUT)\nINT A\nA=1\nEND\n"}),
+        ("change()\n", "", {"change": "DEF change()\n$TECH.CLASS=1\nEND\n"}),
+        (
+            "change()\n",
+            "",
+            {"change": "DEF change()\ninner()\nEND\n", "inner": "DEF inner()\n$TECH.CLASS=1\nEND\n"},
+        ),
+        (WHEN["trigger"].format("change()"), "", {"change": "DEF change()\n$TECH.CLASS=1\nEND\n"}),
+    ],
+)
+def test_a_variable_of_unknown_effect_is_reported_whatever_routine_sets_it(
+    statement: str, routine: str, siblings: dict[str, str]
+) -> None:
+    program = read(f"{HEAD}LIN {FULL}\n{statement}LIN {FULL}\nEND\n{routine}", **siblings)
+    assert [one.line for one in program.findings if one.code == "KRL037"] == [HEAD.count("\n") + 2]
+
+
+def test_a_variable_that_a_routine_only_reads_is_not_reported() -> None:
+    text = f"{HEAD}change($TECH.CLASS)\nLIN {FULL}\nEND\nDEF change(A:IN)\nINT A\nEND\n"
+    assert "KRL037" not in [finding.code for finding in read(text).findings]
+
+
+@pytest.mark.parametrize("how", SETTING)
+@pytest.mark.parametrize("again", ["", "$ASYNC_AXIS=0\n"])
+def test_external_axes_are_not_claimed_that_may_be_left_out_of_motions(how: str, again: str) -> None:
+    point = FULL[:-1] + ",E1 50}"
+    text = f"{HEAD}LIN {point}\n{SETTING[how].format('$ASYNC_AXIS=1')}{again}LIN {point}\nEND\n"
+    before, after = read(text).toolpath.external[:, 0]
+    assert before == 50.0
+    assert (after == 50.0) == (how == "assignment" and again != "")

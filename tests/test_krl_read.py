@@ -336,7 +336,7 @@ def test_a_point_that_a_refused_motion_builds_on_is_pinned(later: str, pinned: l
         ("base ?", "$BASE=F:{X 1,Y 0,Z 0,A 0,B 0,C 0}"),
         ("base ?", "BAS(#BASE,n)"),
         ("base ?", "BASE_DATA[4]=F\nBAS(#BASE,4)"),
-        ("base ?", "$BASE.X=5"),
+        ("base [1]{0 0 0 0 0 0}.X=5", "$BASE.X=5"),
         ("base ?", "BAS(#EX_BASE,1)"),
         ("base ?", "IF $IN[1] THEN\n$BASE=BASE_DATA[2]\nENDIF"),
         ("base ?", "FDAT_ACT=FP7\nBAS(#FRAMES)"),

@@ -246,3 +246,35 @@ def test_a_tool_that_the_cell_states_and_the_program_assigns(assigned: str) -> N
     settings = ReadingSettings(symbols={"TSPINDLE": 1.0})
     path = DIALECTS["rapid"].read((Document(Path("part.mod"), text.encode()),), settings).toolpath
     assert path.constraints.refused[0].code == "RAP005"
+
+
+AT_START = {
+    "VelSet 100,5000;": "VelSet 100,800;",
+    "SingArea\\Off;": "SingArea\\Wrist;",
+    "ConfL\\On;": "ConfL\\Off;",
+    "ConfJ\\On;": "ConfJ\\Off;",
+    "CirPathMode\\PathFrame;": "CirPathMode\\ObjectFrame;",
+}
+"""What is in force where a program starts, and another thing."""
+ASIDE = {
+    "trap": "PROC main()\nCONNECT i WITH tr;\nMoveL p,v50,z10,t;\nENDPROC\nTRAP tr\n{}\nENDTRAP\n",
+    "handler": "PROC main()\nMoveL p,v50,z10,t;\nERROR\n{}\nTRYNEXT;\nENDPROC\n",
+}
+
+
+@pytest.mark.parametrize("aside", ASIDE)
+@pytest.mark.parametrize("stated", AT_START)
+def test_a_trap_that_states_what_is_in_force_anyway_changes_nothing(stated: str, aside: str) -> None:
+    text = ASIDE[aside]
+    program = read(text.format(stated))
+    assert list(program.toolpath.constraints.refused) == []
+    assert list(program.toolpath.dump()) == list(read(text.format("")).toolpath.dump())
+    assert list(read(text.format(AT_START[stated])).toolpath.constraints.refused) == [0]
+
+
+@pytest.mark.parametrize("aside", ASIDE)
+@pytest.mark.parametrize("stated", AT_START)
+def test_a_trap_that_returns_to_what_the_program_changed_is_not_passed_over(stated: str, aside: str) -> None:
+    before = f"PROC main()\n{AT_START[stated]}"
+    program = read(ASIDE[aside].format(stated).replace("PROC main()", before))
+    assert list(program.toolpath.constraints.refused) == [0]

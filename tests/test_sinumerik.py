@@ -112,6 +112,7 @@ def test_the_programmed_frame_ends_with_trans() -> None:
     ("text", "code"),
     [
         ("GEOAX()\nG1 X1 Y2 Z3", ""), ("GEOAX(3,W)\nG1 X1 Y2 Z3", "GCO010"),
+        ("GEOAX(3,W)\nTRAFOOF\nG1 X1 Y2 Z3", "GCO010"), ("CPRECON\nG1 X1 Y2 Z3", ""), ("CPRECOF\nG1 X1 Y2 Z3", ""),
         ('TRAFOON("A")\nG1 X1 Y2 Z3', "GCO010"), ('TRAFOON("A")\nTRAFOOF\nG1 X1 Y2 Z3', ""),
         ("TOFFON(Z,5)\nG1 X1 Y2 Z3", "GCO014"), ("LEADON(Y,X,1)\nG1 X1 Y2 Z3", "GCO014"),
         ("ID=1 WHENEVER $A_IN[1]==1 DO $AA_OFF[Z]=1\nG1 X1 Y2 Z3", "GCO019"),

@@ -87,3 +87,33 @@ def test_a_comparison_that_rounding_decides_is_not_decided(
         "L P[3] 9mm/sec FINE",
     )
     assert path.predecessors.get(2, (1,)) == known
+
+
+DISTANCES = ("10", "10mm", " 7.5 mm", "R[3]", "AR[1]")
+
+
+@pytest.mark.parametrize("distance", DISTANCES)
+@pytest.mark.parametrize("corner", ["CR20", "CNT50"])
+@pytest.mark.parametrize(("option", "row"), [("RT_LD", 1), ("AP_LD", 0)])
+def test_a_corner_beside_a_part_that_is_a_line_has_no_known_size(
+    option: str, row: int, corner: str, distance: str
+) -> None:
+    """RT_LD: the start of the motion is a line, so the corner at its end may be smaller; AP_LD: that before it."""
+    motions = [f"L P[{n}] 50mm/sec {corner}" for n in (1, 2, 3)]
+    plain = read(*motions)
+    motions[1] += f" {option}{distance}"
+    path = read(*motions)
+    assert not path.constraints.refused
+    assert list(path.dump()) == list(plain.dump())
+    assert list(path.constraints.no_insert_before) == [1]
+    sizes, numbers = path.approximation, path.sequence.approximation_number
+    assert np.isnan([sizes[row], numbers[row]]).all()
+    others = [one for one in range(3) if one != row]
+    assert np.array_equal(sizes[others], plain.approximation[others], equal_nan=True)
+    assert np.array_equal(numbers[others], plain.sequence.approximation_number[others], equal_nan=True)
+
+
+def test_a_motion_that_stops_stays_exact_beside_a_part_that_is_a_line() -> None:
+    path = read("L P[1] 50mm/sec FINE", "L P[2] 50mm/sec FINE RT_LD10 AP_LD5", "L P[3] 50mm/sec CR5 RT_LD")
+    assert path.approximation[:2].tolist() == [0.0, 0.0]
+    assert path.constraints.refused[2].code == "FTP001"

@@ -99,7 +99,7 @@ def _pose(frame: FrameRef, numbered: dict[int, Poses]) -> Poses:
     found = None if frame.entry is None else numbered.get(frame.entry, frame.declared)
     if found is None:
         return UNKNOWN
-    return found if frame.in_entry is None else found @ frame.in_entry[1]
+    return frame.placed_in(found)
 
 
 def _spindle(frame: FrameRef, cell: Cell) -> Floats:

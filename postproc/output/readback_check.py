@@ -124,7 +124,7 @@ def _check_frames(path: Toolpath, back: Toolpath, file: str) -> None:
 
 
 def _same_frame(one: FrameRef, other: FrameRef) -> bool:
-    if (one.number, one.entry) != (other.number, other.entry):
+    if (one.number, one.entry, one.components) != (other.number, other.entry, other.components):
         return False
     poses = [frame.pose if frame.in_entry is None else frame.in_entry[1] for frame in (one, other)]
     if poses[0] is None or poses[1] is None:

@@ -26,6 +26,9 @@ class Kind(IntEnum):
     SPL = 5  # a point of a spline: the path between is the controller's
 
 
+FrameComponents = tuple[float | None, float | None, float | None]
+
+
 @dataclass(frozen=True)
 class FrameRef:
     """A base or tool frame as the program names it.
@@ -35,8 +38,9 @@ class FrameRef:
     ``line`` is where it was set, for messages.  ``declared``: what the controller's own file states of a frame whose
     ``pose`` the program does not state; the cell's base or tool of that number comes first.
     ``in_entry``: (number, pose) of a frame that the program states in such an entry (``BASE_DATA[2]:{X 10 ...}``):
-    ``number`` and ``pose`` are None then, and ``declared`` is that of the entry.  ``load``: mass [kg] of a tool and its
-    centre [m] in flange axes where the program, or the controller's own file, states them.
+    ``number`` and ``pose`` are None then, and ``declared`` is that of the entry; ``components``: X, Y, Z [m] that the
+    program sets of such a frame afterwards (``$TOOL.Z=150``), None where it does not.  ``load``: mass [kg] of a tool
+    and its centre [m] in flange axes where the program, or the controller's own file, states them.
     """
 
     number: int | None
@@ -44,12 +48,21 @@ class FrameRef:
     line: int = 0
     declared: Poses | None = None
     in_entry: tuple[int, Poses] | None = None
+    components: FrameComponents = (None, None, None)
     load: tuple[float, float, float, float] | None = None
 
     @property
     def entry(self) -> int | None:
         """The number of the entry that it is, or in which it is stated; None without one."""
         return self.number if self.in_entry is None else self.in_entry[0]
+
+    def placed_in(self, entry: Poses) -> Poses:
+        """The frame where the controller's ``entry`` is this pose."""
+        pose = entry if self.in_entry is None else entry @ self.in_entry[1]
+        if self.components == (None, None, None):
+            return pose
+        changed = zip(self.components, pose.position, strict=True)
+        return Poses(pose.rotation, np.array([old if new is None else new for new, old in changed]))
 
 
 @dataclass(frozen=True)

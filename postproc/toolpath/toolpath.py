@@ -298,11 +298,13 @@ class Toolpath(MotionColumns):
         frame = self.frames[index]
         pose = frame.pose if frame.in_entry is None else frame.in_entry[1]
         entry = "" if frame.pose is not None else f"[{frame.entry}]"
+        set_later = zip("XYZ", frame.components, strict=True)
+        changes = "".join(f".{key}={_number(value / MM)}" for key, value in set_later if value is not None)
         if pose is None:
-            return entry
+            return entry + changes
         angles = abc_from_rotation(pose.rotation) / DEG
         numbers = [*(pose.position / MM), *angles]
-        return f"{entry}{{{' '.join(_number(value) for value in numbers)}}}"
+        return f"{entry}{{{' '.join(_number(value) for value in numbers)}}}{changes}"
 
 
 def external_at(path: Toolpath, rows: Ints, share: Floats | None = None) -> Floats:

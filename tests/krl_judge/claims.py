@@ -139,7 +139,12 @@ def _frame(frames: tuple[FrameRef, ...], index: int, table: dict[int, Six]) -> n
             entry = None if stated is None else matrix(dict(zip(FRAME, stated, strict=True)))
         else:
             entry = _homogeneous(frame.declared)
-        return entry if entry is None or frame.in_entry is None else entry @ _homogeneous(frame.in_entry[1])
+        found = entry if entry is None or frame.in_entry is None else entry @ _homogeneous(frame.in_entry[1])
+        if found is not None:
+            for axis, value in enumerate(frame.components):
+                if value is not None:
+                    found[axis, 3] = value / MM
+        return found
     return _homogeneous(frame.pose)
 
 

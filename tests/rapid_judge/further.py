@@ -85,7 +85,16 @@ class FurtherWriter(Writer):
 
     def aside(self) -> list[str]:
         """What a trap or a handler does."""
-        found = [self.pick("n3:=n3+1;", "SetDO do3,1;", "p3.trans.z:=9;")]
+        found = [
+            self.pick(
+                "n3:=n3+1;",
+                "SetDO do3,1;",
+                "p3.trans.z:=9;",
+                "VelSet 100,5000;",
+                "SingArea\\Off;",
+                "ConfL\\On;",
+            )
+        ]
         if self.strays:
             found.append(self.pick(f"MoveL {self.target()},v50,fine,t1;", "sub2;", "MoveJ p1,v50,fine,t1;"))
         return found

@@ -36,6 +36,8 @@ FRAMED = {
     Group.DIAMETER: "diameters (G7)",
     Group.LENGTHS: "an offset that the program computes",
     Group.FOREIGN: "those of an unknown mode",
+    Group.FACE: "those of polar interpolation (G12.1)",
+    Group.BENT: "those of a mode that is not read (G7.1, G54.2, GEOAX)",
     Group.CARRIER: "those of a tool whose offsets the control turns (TCARR)",
     Group.OFFSETS: "those of a tool whose length the program adds to (TOFFL, DL)",
 }

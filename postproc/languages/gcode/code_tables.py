@@ -186,11 +186,11 @@ FANUC = Control(
                 (Group.LENGTHS, 1, (43.8, 43.9, 143)),
                 (Group.TURNED, 1, (68.5, 68.6)),
                 (Group.DIAMETER, 1, (10.9,)),
-                (Group.FOREIGN, 1, (7, 51.2, 54.2, 54.4)),
-                (Group.FOREIGN, 1, (7.1, 107, 112, 12.1)),
+                (Group.BENT, 1, (7, 7.1, 107, 51.2, 54.2, 54.4)),
+                (Group.FACE, 1, (112, 12.1)),
                 (Group.ONCE, Once.FRAME, (68, 68.2, 53.1, 51.1, 50.1)),
                 (Group.PLACED, 0, (69, 69.1)),
-                (Group.FOREIGN, 0, (113, 13.1)),  # G113 only where such a mode is in force, see modal
+                (Group.FACE, 0, (113, 13.1)),  # G113 only where such a mode is in force, see modal
             )
         ),
     },

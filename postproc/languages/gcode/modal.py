@@ -61,6 +61,8 @@ _RESTORED = (
 """What M72 and M73 restore: not what kind of motion it is (LinuxCNC, M codes, "Save Modal State")."""
 CALLING_M = (96, 97, 98, 99, 198)
 """M codes that have a P."""
+_FIXTURES = (542, 544)
+"""G54.2 P, G54.4 P of a Fanuc: offsets that turn with a table, or for a part that is not straight; with P0 none."""
 _FARTHEST_OFFSET = 1e6
 """No control numbers its offsets so far."""
 
@@ -218,7 +220,8 @@ def _unused(
     using[blocks[~np.isin(groups, _PLAIN) & ~(np.isin(groups, _ENDS) & (values == 0))]] = True
     m, axis = source.column(key("M")), source.mask(*(key(letter) for letter in "XYZABC"))
     using[m.block[~np.isin(m.value, _WORDLESS_M) | ~axis[m.block]]] = True
-    using |= force[Group.MACRO].astype(bool) | force[Group.FOREIGN].astype(bool)
+    for group in (Group.MACRO, Group.FOREIGN, Group.FACE, Group.BENT):
+        using |= force[group].astype(bool)
     move = force[Group.MOTION]
     using |= ~np.isin(move, (*_WORDLESS, *_CURVED))
     curved = np.isin(move, _CURVED)
@@ -293,6 +296,11 @@ def _offsets(
         fine = (given >= 0) & (given < _FARTHEST_OFFSET)
         chosen = np.where(fine, 100 + np.where(fine, given, 0), UNKNOWN).astype(np.int32)
         values = np.where(numbered, chosen, values)
+    fixture = np.isin(number, _FIXTURES) & (groups == Group.BENT)
+    if fixture.any():
+        none = fixture & (source.column(key("P")).last(blocks) == 0)
+        groups = np.where(none, np.int8(Group.NONE), groups)
+        values = np.where(none, np.int32(0), values)
     selecting = (number == 150) & (groups == Group.POLAR)
     if selecting.any():
         # An Okuma: G15 H selects the offset, and G54 to G59 with an H are lengths of tools.
@@ -307,10 +315,10 @@ def _polar_or_offset(
     flow: ExecutionFlow, number: Ints, groups: Ints, values: Ints, blocks: Ints
 ) -> tuple[Ints, Ints]:
     """Groups and values where G113 ends a mode only if one is in force; else it is an offset of a Haas, as G110 is."""
-    polar = groups == Group.FOREIGN
+    polar = groups == Group.FACE
     ending = (number == 1130) & polar
     if ending.any():
-        force = _Fill(flow, 0, Group.FOREIGN)(blocks[polar], values[polar])
+        force = _Fill(flow, 0, Group.FACE)(blocks[polar], values[polar])
         before = np.append(np.zeros(1, force.dtype), force)[blocks]  # in the block ahead
         ending &= before != 1
         groups = np.where(ending, np.int8(Group.OFFSET), groups)

@@ -268,6 +268,8 @@ class RunFlow(RunCalls):
                 self.hide(self.frames[-1].call)
             if statement.verb == Verb.GOTO:
                 target = self.labels.find(statement, block)
+                if self.labels.is_missing(statement, block):
+                    continue
                 if target is None or not start <= target <= stop:
                     raise NotFollowed
             if statement.verb == Verb.REPEAT_PART:
@@ -281,7 +283,10 @@ class RunFlow(RunCalls):
         self.emit(statement.block, statement.block + 1)
         if not holds:
             return statement.block + 1
-        target = self.labels.find(self.computed(statement), statement.block)
+        jump = self.computed(statement)
+        if jump.direction == "C" and self.labels.is_missing(jump, jump.block):
+            return statement.block + 1
+        target = self.labels.find(jump, jump.block)
         if target is None:
             raise NotFollowed
         self.entered.append(self.count)
@@ -303,6 +308,9 @@ class RunFlow(RunCalls):
         """A jump that happens only sometimes, to its label or to ``target``: what it passes may run or not.  Raises
         NotFollowed."""
         start = statement.block
+        if target is None and self.labels.is_missing(statement, start):
+            self.emit(start, start + 1)
+            return start + 1
         stop = self.labels.find(statement, start) if target is None else target
         if stop is None or stop <= start or self.frames:
             raise NotFollowed
@@ -320,9 +328,10 @@ class RunFlow(RunCalls):
                 stop = max(stop, around.stop + 1)
             if inner is not None and inner.verb == Verb.GOTO:
                 target = self.labels.find(inner, block)
-                if target is None or target <= start:
-                    raise NotFollowed
-                stop = max(stop, target)
+                if not self.labels.is_missing(inner, block):
+                    if target is None or target <= start:
+                        raise NotFollowed
+                    stop = max(stop, target)
             if inner is not None and inner.verb == Verb.REPEAT_PART:
                 raise NotFollowed
             if self.codes.get(block) == "return":

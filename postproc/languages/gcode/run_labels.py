@@ -16,6 +16,7 @@ from postproc.languages.gcode.words import key
 _ARCHIVE = re.compile(r"_N_(\w+?)_(?:MPF|SPF)", re.I)
 
 
+_BLOCK_NUMBER = re.compile(r"N?\d{1,9}")
 _NUMBERED = re.compile(r"O?0*(\d{1,9})")
 
 
@@ -37,6 +38,7 @@ class RunLabels:
         self._blocks: defaultdict[str, list[int]] = defaultdict(list)
         numbers = source.column(key("N"))
         fine = np.isfinite(numbers.value)
+        self._all_numbered = bool(fine.all())
         for value, block in zip(numbers.value[fine].tolist(), numbers.block[fine].tolist(), strict=True):
             self._blocks[f"{value:.0f}"].append(block)
         for note in source.notes:
@@ -67,6 +69,14 @@ class RunLabels:
             return None
         wrong = {"F": inside[0] <= statement.block, "B": inside[0] > statement.block}
         return None if wrong.get(statement.direction, False) and statement.verb.name == "GOTO" else inside[0]
+
+    def is_missing(self, statement: FlowStatement, block: int) -> bool:
+        """Whether a jump from ``block`` is to a block number that no block of the program has: GOTOC goes on then, and
+        any other one is an alarm.  A name may be that of a variable with the label, which another file sets."""
+        start, stop = self.part_of(block)
+        if not (self._all_numbered and _BLOCK_NUMBER.fullmatch(statement.label)):
+            return False
+        return not any(start <= at < stop for at in self._blocks.get(label_name(statement.label), ()))
 
     def number(self, number: int, block: int) -> int | None:
         """The block with a number in the program that ``block`` is in."""

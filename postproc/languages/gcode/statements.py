@@ -104,7 +104,7 @@ def statement(note: Note) -> FlowStatement | None:
     if note.kind == "call":
         return FlowStatement(block, Verb.CALL, text)
     if (found := _GOTO.fullmatch(text)) is not None:
-        if found[2] in ("C", "S"):
+        if found[2] == "S":
             raise NotFollowed
         return FlowStatement(block, Verb.GOTO, found[3], found[1] or "", found[2])
     if (found := _PART.fullmatch(text)) is not None:

@@ -16,13 +16,14 @@ from postproc.languages.krl.lexing import Assignment, Call, Statement, Statement
 from postproc.languages.krl.modal_state import NAN
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.predecessors import expanded
-from postproc.languages.krl.statement_effects import READS_POSITION, SYSTEM, bas
+from postproc.languages.krl.statement_effects import READS_POSITION, bas
+from postproc.languages.krl.system_variables import SYSTEM
 
 _STOPPING = frozenset(b"$IN $OUT $ANIN $ANOUT $DIGIN1 $DIGIN2 $DIGIN3 $DIGIN4 $DIGIN5 $DIGIN6".split())
 _FLOWING = frozenset(
     b"$VEL $VEL_AXIS $ACC $ACC_AXIS $JERK $GEAR_JERK $LOAD $ADVANCE $NULLFRAME $OUT_C $FLAG $CYCFLAG $BWDSTART $H_POS "
     b"$SPL_VEL_MODE $SPL_VEL_RESTR BASE_DATA TOOL_DATA LOAD_DATA".split()
-) | {name for name in SYSTEM if name not in (b"$WORLD", b"$ROBROOT")}
+) | {name for name, decides in SYSTEM.items() if decides not in ("root", "apart")}
 _WORDS = frozenset(
     b"AND OR NOT EXOR B_AND B_OR B_NOT B_EXOR IF THEN WHILE UNTIL FOR TO STEP SWITCH CASE RETURN TRUE FALSE "
     b"ABS SIN COS TAN ACOS ATAN ATAN2 SQRT FORWARD INVERSE INV_POS "

@@ -22,7 +22,7 @@ from postproc.languages.krl.modal_state import NAN, OVERRIDES, FrameIndex, Recor
 from postproc.languages.krl.motion_rows import RowRefusal
 from postproc.languages.krl.spatial import ZERO
 from postproc.languages.krl.statement_effects import BAS_COMMANDS, MODAL, READS_POSITION, bas
-from postproc.languages.krl.system_variables import INERT
+from postproc.languages.krl.system_variables import has_unknown_effect
 from postproc.languages.krl.target import (
     AXES,
     COMPONENTS,
@@ -101,9 +101,8 @@ def assign(run: ExecutionContext, statement: Statement, assignment: Assignment, 
         state.axis_record = _record(run, assignment, state.axis_record)
     elif not name.startswith(b"$"):
         _set_variable(run, assignment)
-    elif name not in INERT and not name.startswith(b"$LOAD"):
-        message = f"what {shown(name)} does to motions is not known; they are read as if it was not set"
-        run.add_finding("KRL037", message, statement)
+    elif has_unknown_effect(name):
+        run.report_unknown_effect(shown(name), statement)
 
 
 def with_clause(run: ExecutionContext, statement: Statement, clause: bytes) -> RowRefusal | None:
@@ -252,19 +251,24 @@ def _assigned_frame(
 ) -> FrameIndex | UnknownValue:
     value = assignment.value.strip()
     if assignment.path or assignment.element is not None:
-        before = run.frames.values(run.state.base if name == b"$BASE" else run.state.tool)
-        changed = run.value(value)
-        if (
-            before is None
-            or not is_number(changed)
-            or assignment.path not in COMPONENTS
-            or assignment.element is not None
-        ):
+        frame = run.state.base if name == b"$BASE" else run.state.tool
+        before, changed = run.frames.values(frame), run.value(value)
+        component = COMPONENTS.get(assignment.path)
+        if component is None or assignment.element is not None:
             return UnknownValue(
+                "KRL012", f"what is set of it, {shown(assignment.path)}, is no component of a frame"
+            )
+        if not is_number(changed):
+            return UnknownValue("KRL012", f"{shown(assignment.path)} is not set to a constant number")
+        if before is None:
+            of_entry = None
+            if isinstance(frame, FrameIndex):
+                of_entry = run.frames.with_component(frame, component, float(changed), line)
+            return of_entry or UnknownValue(
                 "KRL012", f"{shown(assignment.path)} is relative to a frame that is not given in numbers"
             )
         values = list(before)
-        values[COMPONENTS[assignment.path]] = float(changed)
+        values[component] = float(changed)
         x, y, z, a, b, c = values
         return run.frames.known(None, (x, y, z, a, b, c), line)
     if value.upper() in (b"$WORLD", b"$NULLFRAME"):

@@ -12,7 +12,6 @@ from postproc.languages.core.waits import Waits
 from postproc.languages.krl.assignments import command, keep
 from postproc.languages.krl.block_flow import BlockFlow
 from postproc.languages.krl.expressions import Value, index_text
-from postproc.languages.krl.external_axes import apart
 from postproc.languages.krl.flow_frames import BlockFrame, LabelHead, Restart
 from postproc.languages.krl.later_changes import EVENTS
 from postproc.languages.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, split_values
@@ -24,7 +23,6 @@ from postproc.languages.krl.routine_calls import callers, closure
 from postproc.languages.krl.statement_effects import (
     EVERYTHING_AND_COMMENTS,
     PATH_FROM_FILE,
-    SYSTEM,
     Effect,
     Effects,
     as_effects,
@@ -32,6 +30,7 @@ from postproc.languages.krl.statement_effects import (
     is_harmless,
     returned_by,
 )
+from postproc.languages.krl.system_variables import SYSTEM, has_unknown_effect
 from postproc.languages.krl.target import shown
 from postproc.languages.krl.variables import Entry
 from postproc.languages.krl.vectorised import Item
@@ -426,13 +425,14 @@ class Calls(BlockFlow):
     def _note_other(self, item: Statement, name: bytes) -> None:
         """Takes up what else another module does, now or at a time of its own."""
         run, (module, _) = self.run, self.run.others.routines[name]
-        if module.apart:
-            run.state.external_apart |= {b"$ASYNC_AXIS"}
-            run.state.external = apart(run.state.external)
+        run.state.set_apart(module.apart)
         if module.has_trigger:
             run.state.no_insert = TRIGGERED
         run.expect_later(module.structure.later_effects, item.line)
         file = module.document.path.name
+        for effect in sorted(one for one in run.effects_of_others[name] if isinstance(one, bytes)):
+            if has_unknown_effect(effect):
+                run.report_unknown_effect(f"{shown(effect)}, which {file} sets,", item)
         for unread in run.others.unread[name]:
             called = f"{shown(unread)}, which {file} calls,"
             message = f"{called} is not read: base and tool are assumed unchanged by it"

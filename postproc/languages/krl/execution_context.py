@@ -11,6 +11,7 @@ from typing import NamedTuple
 from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.languages.core.motion_sources import together
+from postproc.languages.core.waits import Waits
 from postproc.languages.krl.data import Declarations
 from postproc.languages.krl.expressions import Value, decided_by_digits, evaluate
 from postproc.languages.krl.lexing import FRAME_TABLES, Statement
@@ -63,7 +64,8 @@ class ExecutionContext:
     structure is not understood.  ``spline``: the spline block that is open.  ``has_tcp_mode``, ``has_turning``: some
     line names another interpolation mode, or another way of turning the tool, than the usual one; ``has_override``:
     some line names a speed override.  ``initial``: what holds where the program starts.  ``root_set``, ``later_since``,
-    ``later_speed``, ``moved_later``, ``ended_later``, ``later_comments``: what ``ModalState`` calls so.
+    ``later_speed``, ``moved_later``, ``ended_later``, ``later_comments``: what ``ModalState`` calls so;
+    ``apart_later``: an interrupt or a trigger may take external axes out of motions.
     ``others``: the modules read besides; ``effects_of_others``: what their routines change of what this one knows;
     ``unread``: routines that are called and not read; ``depth``: how many calls of other modules lead here.
     """
@@ -99,6 +101,7 @@ class ExecutionContext:
     moved_later: int = 0
     ended_later: int = 0
     later_comments: frozenset[Effect] = frozenset()
+    apart_later: bool = False
     unread: set[bytes] = field(default_factory=set)
     depth: int = 0
 
@@ -110,14 +113,23 @@ class ExecutionContext:
         line, column = self.document.place(statement.at)
         self.findings.append(Finding(code, message, str(self.document.path), line, column))
 
+    def report_unknown_effect(self, name: str, statement: Statement) -> None:
+        """Notes that the program sets a variable of the controller whose effect is not known."""
+        message = f"what {name} does to motions is not known; they are read as if it was not set"
+        self.add_finding("KRL037", message, statement)
+
     def expect_later(self, effects: Effects, line: int) -> None:
         """Takes up what an interrupt or a trigger may do at any time from ``line`` on."""
-        if not effects.isdisjoint(("base", "tool", "mode", "turning", "root")):
+        if not effects.isdisjoint(("base", "tool", "mode", "turning", "root", "record")):
             self.state.later_since = self.state.later_since or line
             self.later_since = self.later_since or line
         self.later_speed |= effects & {"feed", "apo"}
         if "override" in effects:
             self.later_speed |= {"feed"}
+        if "advance" in effects:
+            self.later_speed |= {"apo"}
+        self.apart_later = self.apart_later or "apart" in effects
+        self.state.set_apart(self.apart_later)
         self.state.later_speed |= self.later_speed
         if "point" in effects:
             self.moved_later = self.moved_later or line
@@ -147,6 +159,9 @@ class ExecutionContext:
         self.state.forget(words, why, self.has_tcp_mode, self.has_turning)
         if "override" in words and self.has_override:
             self.state.overridden = OVERRIDES
+        if "advance" in words & self.structure.effects:
+            self.state.no_advance = max(self.state.no_advance, Waits.MAYBE)
+        self.state.set_apart("apart" in words & self.structure.effects)
         if "root" in words:
             self.state.root_set = self.state.root_set or self.variables.line
             self.root_set = self.root_set or self.variables.line

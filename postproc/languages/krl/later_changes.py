@@ -4,8 +4,16 @@ from __future__ import annotations
 
 import re
 
-from postproc.languages.krl.lexing import NAME, Call, Statement, cached, without_strings
-from postproc.languages.krl.statement_effects import SYSTEM, called_in, is_harmless
+from postproc.languages.krl.lexing import NAME, Call, Statement, cached, identifiers, without_strings
+from postproc.languages.krl.statement_effects import (
+    READS_POSITION,
+    Directions,
+    called_in,
+    functions_of,
+    is_harmless,
+    returned_by,
+)
+from postproc.languages.krl.system_variables import SYSTEM, has_unknown_effect
 
 EVENTS = frozenset([b"INTERRUPT", b"TRIGGER", b"GLOBAL"])
 """First words of statements that say what happens at a time of its own."""
@@ -41,3 +49,31 @@ def later_functions(code: bytes) -> tuple[bytes, ...]:
     return tuple(
         name for name in called_in(text) if name not in done | _NO_FUNCTIONS and not is_harmless(name)
     )
+
+
+def variables_of_unknown_effect(statement: Statement, known: Directions) -> set[bytes]:
+    """Variables of the controller whose effect is not known and that a statement sets otherwise than by an assignment
+    of its own: an interrupt or a trigger does, or a routine for whose parameter they are handed over.
+
+    known: name of a routine -> of each parameter whether it comes back changed.
+    """
+    if b"$" not in statement.code:
+        return set()
+    names: set[bytes | str] = set()
+    calls, functions = [], functions_of(statement)
+    if statement.word in EVENTS:
+        calls = later_actions(statement)
+        functions += later_functions(statement.code)
+        names.update(one.name for one in calls)
+    elif isinstance(statement.strings, Call):
+        calls = [statement.strings]
+    for call in calls:
+        if call.name in known:
+            names |= returned_by(call, known)
+    if any(any(known.get(function, ())) for function in functions):
+        names |= identifiers(statement.code)
+    return {
+        name
+        for name in names
+        if isinstance(name, bytes) and has_unknown_effect(name) and not READS_POSITION.match(name)
+    }

@@ -13,7 +13,7 @@ from postproc.languages.core.comments_in_force import VARYING, InForce, join_com
 from postproc.languages.core.field_joins import SOMETIMES, FieldJoins, either, is_same, lost
 from postproc.languages.core.frame_table import FrameTable
 from postproc.languages.core.motion_sources import ELSEWHERE, START, Source
-from postproc.languages.krl.external_axes import ALL_LOST, UNSTATED, six
+from postproc.languages.krl.external_axes import ALL_LOST, UNSTATED, apart, six
 from postproc.languages.krl.spatial import ZERO, Numbers
 from postproc.languages.krl.statement_effects import Effect
 from postproc.languages.krl.target import FrameEntry, KrlTarget, Six, UnknownValue, known
@@ -26,6 +26,10 @@ Record = dict[bytes, bytes]
 """FDAT, LDAT or PDAT: key -> value, upper case."""
 
 
+SetComponents = tuple[float | None, float | None, float | None]
+NONE_SET: SetComponents = (None, None, None)
+OTHERWISE = b""
+"""In ``external_apart``: what no assignment of the program ends."""
 TRIGGERED = "a TRIGGER before it refers to it"
 
 
@@ -48,6 +52,7 @@ class FrameRegister(FrameTable):
         super().__init__()
         self._values: list[Numbers | None] = []
         self._within: list[Numbers] = []
+        self._components: list[SetComponents] = []
 
     def known(self, number: int | None, values: Numbers | None, line: int) -> FrameIndex:
         """The frame of this number and pose (X..C, mm and deg); number 0 is the identity."""
@@ -58,20 +63,41 @@ class FrameRegister(FrameTable):
         )
         return self._with(found, line, values, ZERO)
 
-    def in_entry(self, entry: FrameEntry, line: int) -> FrameIndex:
-        """The frame that is, or is stated in, an entry whose pose the program does not state."""
-        if entry.within == ZERO:
+    def in_entry(self, entry: FrameEntry, line: int, components: SetComponents = NONE_SET) -> FrameIndex:
+        """The frame that is, or is stated in, an entry whose pose the program does not state; components: X, Y, Z
+        [mm] that are set of it afterwards."""
+        if entry.within == ZERO and components == NONE_SET:
             return self.known(entry.number, None, line)
+        x, y, z = (None if one is None else one * MM for one in components)
         found = self.index(
-            (entry.number, entry.within, True),
-            lambda: FrameRef(None, None, line, in_entry=(entry.number, _pose(entry.within))),
+            (entry.number, entry.within, components, True),
+            lambda: FrameRef(
+                None, None, line, in_entry=(entry.number, _pose(entry.within)), components=(x, y, z)
+            ),
         )
-        return self._with(found, line, None, entry.within)
+        return self._with(found, line, None, entry.within, components)
 
-    def _with(self, index: int, line: int, values: Numbers | None, within: Numbers) -> FrameIndex:
+    def with_component(self, frame: FrameIndex, component: int, value: float, line: int) -> FrameIndex | None:
+        """A frame of the controller whose X, Y or Z (``component`` 0, 1, 2) is set to a value [mm]; None for an angle,
+        as which angles the controller has for it is not known, and where no entry has the frame."""
+        number = self.refs[frame.index].entry
+        if number is None or component > 2:
+            return None
+        x, y, z = (value if i == component else one for i, one in enumerate(self._components[frame.index]))
+        return self.in_entry(FrameEntry("", "", b"", number, self._within[frame.index]), line, (x, y, z))
+
+    def _with(
+        self,
+        index: int,
+        line: int,
+        values: Numbers | None,
+        within: Numbers,
+        components: SetComponents = NONE_SET,
+    ) -> FrameIndex:
         if index == len(self._values):
             self._values.append(values)
             self._within.append(within)
+            self._components.append(components)
         return FrameIndex(index, line)
 
     def values(self, frame: FrameIndex | UnknownValue) -> Numbers | None:
@@ -81,12 +107,13 @@ class FrameRegister(FrameTable):
         """The same frame as one of another register."""
         entry = other.refs[frame.index].in_entry
         if entry is not None:
-            return self.in_entry(FrameEntry("", "", b"", entry[0], other._within[frame.index]), line)
+            within, components = other._within[frame.index], other._components[frame.index]
+            return self.in_entry(FrameEntry("", "", b"", entry[0], within), line, components)
         return self.known(other.refs[frame.index].number, other._values[frame.index], line)
 
     def copied(self, frame: FrameIndex | UnknownValue, table: bytes) -> KrlTarget | FrameEntry | None:
         """What a variable holds to which a frame of ``table``, BASE or TOOL, is assigned; None where it is unknown."""
-        if not isinstance(frame, FrameIndex):
+        if not isinstance(frame, FrameIndex) or self._components[frame.index] != NONE_SET:
             return None
         values, entry = self._values[frame.index], self.refs[frame.index].entry
         if values is not None or entry is None:
@@ -200,6 +227,12 @@ class ModalState:
     def lose_point(self, why: str) -> None:
         self.point = self.axes = self.point_frames = self.anchor = None
         self.point_unknown = why
+
+    def set_apart(self, is_apart: bool) -> None:
+        """Takes up, where it is so, that external axes may not take part in motions."""
+        if is_apart:
+            self.external_apart |= {OTHERWISE}
+            self.external = apart(self.external)
 
     def unsettle(self, has_tcp_mode: bool, has_turning: bool) -> None:
         """Where an interrupt or a trigger may have moved the robot nothing is known of where it is."""

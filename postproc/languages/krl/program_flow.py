@@ -16,7 +16,13 @@ from postproc.languages.krl.execution_context import Flow
 from postproc.languages.krl.expressions import Value
 from postproc.languages.krl.external_axes import by_themselves
 from postproc.languages.krl.flow_frames import Restart, Unfollowed
-from postproc.languages.krl.later_changes import EVENTS, later_actions, later_functions, starts_nothing
+from postproc.languages.krl.later_changes import (
+    EVENTS,
+    later_actions,
+    later_functions,
+    starts_nothing,
+    variables_of_unknown_effect,
+)
 from postproc.languages.krl.lexing import (
     SPLINES,
     Assignment,
@@ -60,6 +66,7 @@ from postproc.languages.krl.statement_effects import (
     effects_of_unknown,
     functions_of,
 )
+from postproc.languages.krl.target import shown
 from postproc.languages.krl.vectorised import Item, VectorisedLines
 from postproc.toolpath import Annotation
 from postproc.toolpath.meant_comments import meant_to_speak
@@ -160,6 +167,7 @@ class ProgramFlow(Calls):
         called_here = routine.name in self.text_called or routine.name in run.structure.later
         unknown = EVERYTHING - {"all"} | (COMMENTS if called_here else set())
         run.forget(unknown, f"at the start of the subprogram of line {routine.line}")
+        run.state.set_apart(run.apart_later)
         run.routine = routine
         self.reset()
         first = len(run.rows)
@@ -242,6 +250,8 @@ class ProgramFlow(Calls):
             run.forget(effects_of_unknown(code), why)
         if b"(" in code:
             self._call_functions(item)
+        for name in sorted(variables_of_unknown_effect(item, structure.directions)):
+            run.report_unknown_effect(shown(name), item)
         if pc in structure.events:
             there = self._block_event(pc, item)
             if there is not None or not self.reachable:

@@ -30,7 +30,6 @@ from postproc.languages.krl.statement_effects import (
     ANNOTATION,
     HERE,
     MODAL,
-    SYSTEM,
     Directions,
     Effect,
     Effects,
@@ -47,6 +46,7 @@ from postproc.languages.krl.statement_effects import (
     returned_by,
 )
 from postproc.languages.krl.statement_forms import is_well_formed
+from postproc.languages.krl.system_variables import SYSTEM
 
 NO_EFFECTS: Mapping[bytes, Effects] = MappingProxyType({})
 NO_DIRECTIONS: Directions = MappingProxyType({})

@@ -1,8 +1,9 @@
 """What a statement changes, reads and calls.
 
-An effect is a word ("point", "base", "tool", "feed", "apo", "mode", "turning", "root", "record", "override", "force",
-"switch" of the FORCE and COMPENSATE comments, "resume" for the end of calls that are under way, "all" for every
-variable that the program assigns) or the name (bytes) of a variable that is assigned.
+An effect is a word ("point", "base", "tool", "feed", "apo", "mode", "turning", "root", "record", "override", "advance"
+of $ADVANCE, "apart" of external axes that do not take part in motions, "force", "switch" of the FORCE and COMPENSATE
+comments, "resume" for the end of calls that are under way, "all" for every variable that the program assigns) or the
+name (bytes) of a variable that is assigned.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from postproc.languages.krl.lexing import (
     split_values,
     without_strings,
 )
+from postproc.languages.krl.system_variables import SYSTEM, has_unknown_effect
 from postproc.languages.krl.target import AXES, COMPONENTS, EXTERNAL
 
 Effect = str | bytes
@@ -60,7 +62,10 @@ _MORE = re.compile(rb"[=(:]|\AGOTO\b", re.I)
 MODAL: Effects = {"base", "tool", "feed", "apo", "mode", "turning"}
 """What BAS may set."""
 
-EVERYTHING: Effects = {"point", "record", "override", "all", *MODAL}
+EVERYTHING: Effects = {"point", "record", "override", "advance", "apart", "all", *MODAL}
+
+_NAMED: Effects = {"advance", "apart"}
+"""What only a statement changes that names a variable for it."""
 
 COMMENTS: frozenset[Effect] = frozenset(["force", "switch"])
 """What comments change that speak to this tool."""
@@ -118,25 +123,6 @@ _BAS_EFFECTS: dict[bytes, Effects] = {
 }
 """The commands of KUKA's bas.src, and what they set; another one may set all of it."""
 BAS_COMMANDS = frozenset(_BAS_EFFECTS)
-SYSTEM: dict[bytes, str] = {
-    b"$BASE": "base",
-    b"$TOOL": "tool",
-    b"$VEL": "feed",
-    b"$OV_PRO": "override",
-    b"$OV_ROB": "override",
-    b"$OV_APPL": "override",
-    b"$RED_VEL": "override",
-    b"$APO": "apo",
-    b"$IPO_MODE": "mode",
-    b"$ORI_TYPE": "turning",
-    b"$CIRC_TYPE": "turning",
-    b"$CIRC_MODE": "turning",
-    b"$ROBROOT": "root",
-    b"$WORLD": "root",
-    b"FDAT_ACT": "record",
-    b"LDAT_ACT": "record",
-    b"PDAT_ACT": "record",
-}
 
 
 def bas(arguments: bytes) -> tuple[bytes, bytes] | None:
@@ -274,6 +260,8 @@ def effects_of(statement: Statement, known: Directions = MappingProxyType({})) -
             return set(), b""
         if said.name in SYSTEM:
             return {SYSTEM[said.name]}, b""
+        if has_unknown_effect(said.name):
+            return {said.name}, b""
         if said.name.startswith(b"$") or said.path in EXTERNAL:
             return set(), b""
         return {said.name}, b""
@@ -288,7 +276,7 @@ def effects_of(statement: Statement, known: Directions = MappingProxyType({})) -
         counter = _COUNTER.match(statement.code)
         return ({counter[1].upper()} if counter else set()), b""
     if statement.kind == StatementKind.UNREADABLE:
-        return (set(EVERYTHING) if _MORE.search(statement.code) else {"point"}), b""
+        return (EVERYTHING - _NAMED if _MORE.search(statement.code) else {"point"}), b""
     if statement.word == b"RESUME":
         return {"resume"}, b""
     return (

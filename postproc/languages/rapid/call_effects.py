@@ -119,8 +119,8 @@ def leaving_words(body: tuple[Statement, ...]) -> set[bytes]:
     return {one.word for one in walk(body) if isinstance(one, Leave)}
 
 
-def mode_changes(bodies: Iterable[tuple[Statement, ...]]) -> ModeChanges:
-    """Those of all statements."""
+def mode_changes(bodies: Iterable[tuple[Statement, ...]], at_start: Set[bytes]) -> ModeChanges:
+    """Those of all statements; at_start: instructions that only state what is in force where a program starts."""
     names: set[bytes] = set()
     speaks = False
     for one in chain.from_iterable(map(walk, bodies)):
@@ -130,4 +130,6 @@ def mode_changes(bodies: Iterable[tuple[Statement, ...]]) -> ModeChanges:
             names |= one.names
         elif isinstance(one, Remark):
             speaks = speaks or SPEAKS.match(one.text) is not None
-    return ModeChanges(names & MODES, speaks, not names.isdisjoint(HALTING | WAITING | {b"WAITTIME"}))
+    return ModeChanges(
+        (names & MODES) - at_start, speaks, not names.isdisjoint(HALTING | WAITING | {b"WAITTIME"})
+    )

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from postproc.languages.rapid.declared_data import walk
 from postproc.languages.rapid.evaluation import Evaluator
-from postproc.languages.rapid.instructions import SCALING
+from postproc.languages.rapid.instructions import MODES, SCALING
 from postproc.languages.rapid.motion_facts import override_of
 from postproc.languages.rapid.program_state import ProgramState
-from postproc.languages.rapid.syntax_tree import Instruction
+from postproc.languages.rapid.syntax_tree import Instruction, Module, NotUnderstood
+from postproc.languages.rapid.values import UnknownData
 from postproc.toolpath import ArcFrame, OrientationMode
 
 MODES_OF_MOTIONS = SCALING | {b"CONFL", b"CONFJ", b"SINGAREA", b"CIRPATHMODE", b"VELSET"}
+_LITERALS_ALONE = Evaluator(lambda name: (UnknownData("it is no literal"), b""))
 
 
 def set_mode(step: Instruction, state: ProgramState, evaluator: Evaluator) -> None:
@@ -30,3 +33,23 @@ def set_mode(step: Instruction, state: ProgramState, evaluator: Evaluator) -> No
             state.override = override_of(step.arguments, evaluator)
         case _:
             state.scaled = True
+
+
+def modes_at_start(module: Module) -> frozenset[bytes]:
+    """Instructions of ``MODES`` by which the module sets nothing but what is in force where a program starts."""
+    others: set[bytes] = set()
+    for routine in module.routines:
+        for step in (*walk(routine.body), *walk(routine.handlers)):
+            if isinstance(step, NotUnderstood):
+                others |= step.names
+            elif isinstance(step, Instruction) and step.name in MODES and not _is_at_start(step):
+                others.add(step.name)
+    return frozenset(MODES - others)
+
+
+def _is_at_start(step: Instruction) -> bool:
+    if step.name not in MODES_OF_MOTIONS:
+        return False
+    state = ProgramState()
+    set_mode(step, state, _LITERALS_ALONE)
+    return state.is_same(ProgramState())

@@ -34,7 +34,7 @@ from postproc.languages.rapid.instructions import (
     is_motion,
 )
 from postproc.languages.rapid.motion_facts import motion_fact, not_read, waits_at
-from postproc.languages.rapid.motion_modes import MODES_OF_MOTIONS, set_mode
+from postproc.languages.rapid.motion_modes import MODES_OF_MOTIONS, modes_at_start, set_mode
 from postproc.languages.rapid.program_state import ProgramState
 from postproc.languages.rapid.routine_entries import program_entries, run_again, run_aside, value_at_start
 from postproc.languages.rapid.routine_graph import RapidStep, RoutineGraph
@@ -92,8 +92,11 @@ class Propagation:
         self._effects = CallEffects(self.usage)
         self._names = RoutineNames(self.data, self.usage)
         self._changes: dict[bytes, ModeChanges] = {}
+        self._at_start = modes_at_start(module)
         aside = [self.routines[name].body for name in self.usage.aside if name in self.routines]
-        self._aside = mode_changes([*aside, *(routine.handlers for routine in module.routines)])
+        aside += [routine.handlers for routine in module.routines]
+        self._aside = mode_changes(aside, self._at_start)
+        self._of_all = mode_changes((routine.body for routine in module.routines), self._at_start)
         bodies = (body for routine in module.routines for body in (routine.body, routine.handlers))
         self._restarts = any(b"EXITCYCLE" in leaving_words(body) for body in bodies)
         self._numbers = KeyNumbers()
@@ -131,7 +134,7 @@ class Propagation:
             if name in self.data and not self.data.is_constant(name):
                 state.put(name, value_at_start(self.data, name, is_main))
         if is_aside:
-            mode_changes(one.body for one in self.module.routines).lose(state, b"its caller")
+            self._of_all.lose(state, b"its caller")
         if self._aside.names - SCALING or self._aside.speaks:
             state.displaced |= {b"a trap or an error handler"}
         if self._aside.names & SCALING:  # at any time
@@ -145,8 +148,7 @@ class Propagation:
     def _start_again(self, main: RapidRoutine, state: ProgramState) -> ProgramState | None:
         """Takes in what the last run of main left, with which it starts again.  What is left at the end where the last
         run started so, and is taken up; UNSETTLED where ``state`` is still to be run."""
-        changes = mode_changes(routine.body for routine in self.module.routines)
-        if not (any(state.values.items()) or changes.names):
+        if not (any(state.values.items()) or self._of_all.names):
             return UNSETTLED
         for number in range(0 if self._restarts else MOST_RUNS):
             self._start()
@@ -167,7 +169,7 @@ class Propagation:
             state.take(again)
         self._record.clear()
         self._forget_all(self.usage.assigned, state)
-        changes._replace(speaks=False).lose(state, b"an earlier run")
+        self._of_all._replace(speaks=False).lose(state, b"an earlier run")
         return UNSETTLED
 
     def _start(self) -> None:
@@ -181,8 +183,8 @@ class Propagation:
         self._forget_all(reach.assigned, state)
         found = self._changes.get(name)
         if found is None:
-            routines = (self.routines[one] for one in reach.routines if one in self.routines)
-            found = self._changes[name] = mode_changes(routine.body for routine in routines)
+            bodies = (self.routines[one].body for one in reach.routines if one in self.routines)
+            found = self._changes[name] = mode_changes(bodies, self._at_start)
         found.lose(state, b"a routine")
         if not reach.routines.isdisjoint(self.usage.moves):
             state.last |= {ELSEWHERE}  # or it is where it was

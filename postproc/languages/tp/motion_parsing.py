@@ -42,6 +42,11 @@ _OWN = re.compile(
     + rb"|(?:Arc|Weld)[ \t]++(?:Start|End)[ \t]*+(?:" + _REGISTER + rb")?+|SPOT" + _REGISTER + rb"|BREAK\b)",
     re.I,
 )  # fmt: skip
+_LINEAR = re.compile(
+    rb"[ \t]*+(RT|AP)_LD[ \t]*+(?:[0-9]++\.?+[0-9]*+(?:[ \t]*+mm)?+|A?+R" + _REGISTER + rb")(?![A-Z0-9_.])",
+    re.I,
+)
+"""The first or the last part of a motion is a line, whatever the corners are; the distance is at least as stated."""
 _DISPLACED = re.compile(
     rb"[ \t]*+(Offset|Tool_Offset|VOFFSET|INC|LOCK_PREG)\b(?:[ \t]*+,[ \t]*+(?:PR|VR|P)"
     + _REGISTER
@@ -70,6 +75,7 @@ class _Options:
     wrist: bool = False
     problem: tuple[str, str] | None = None
     skip: int | None = None
+    linear: frozenset[bytes] = frozenset()
 
 
 def parse_motion(text: bytes) -> TpMove | None:
@@ -107,7 +113,7 @@ def parse_motion(text: bytes) -> TpMove | None:
     return TpMove(
         form, tuple(points), shown, value, unit, termination, corner[:2], b" ".join(options.carried), options.own,
         options.wrist, problem, options.skip, head.span(1), options.alters, options.relative,
-        options.called, options.paced,
+        options.called, options.paced, options.linear,
     )  # fmt: skip
 
 
@@ -175,6 +181,9 @@ def _read_options(text: bytes, at: int, options: _Options) -> int:
             if action is not None and (altering := _ALTERING.match(action)) is not None:
                 options.alters = True
                 options.called = (altering["called"] or b"").decode("latin-1") or options.called
+        elif (found := _LINEAR.match(text, after)) is not None:
+            options.own = True
+            options.linear |= {found[1].upper()}
         elif (found := _DISPLACED.match(text, after)) is not None:
             name = found[1].decode("latin-1")
             options.relative |= name.upper() == "INC"

@@ -132,6 +132,8 @@ class TpRows:
         known = (b"FINE", b"CR")
         blend = np.array([np.nan if value is None or word not in known else value for word, value in corners])
         stops = np.array([word == b"FINE" for word, _ in corners], np.bool_)
+        cut_short = self._cut_short()
+        blend[cut_short] = np.where(stops[cut_short], blend[cut_short], np.nan)
         visited: set[Meeting] = set()
         for row, surely in self.waits.items():
             before = [one for one in self.starts_of(row, visited) if not stops[one]]
@@ -139,9 +141,20 @@ class TpRows:
             blend[before], stops[before] = (0.0 if ends else np.nan), ends
         return blend, stops
 
+    def _cut_short(self) -> list[int]:
+        """Rows at whose end the corner may be smaller than stated, as a motion starts or ends in a line."""
+        found: set[int] = set()
+        for row, move in enumerate(self.moves):
+            if move is not None and b"RT" in move.linear:
+                found.add(row)
+            if move is not None and b"AP" in move.linear:
+                found.update(self.starts_of(row, set()))
+        return sorted(found)
+
     def approximation_numbers(self) -> Floats:
         """(N,) numbers of CNT; below zero those of the registers that have the number of CNT, or of CR, for which the
-        distance is not known; NaN for FINE and for CR with its distance."""
+        distance is not known; NaN for FINE, for CR with its distance and where no number says how large the corner
+        is."""
         numbers = np.full(len(self), np.nan)
         for row, move in enumerate(self.moves):
             if move is None or move.corner[0] == b"FINE":
@@ -152,6 +165,7 @@ class TpRows:
                 numbers[row] = -1.0 - (float(digits[1]) if digits else 0.0) - (_CR if word == b"CR" else 0.0)
             elif word == b"CNT":
                 numbers[row] = value
+        numbers[self._cut_short()] = np.nan
         return numbers
 
 

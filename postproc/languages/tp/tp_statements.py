@@ -47,7 +47,8 @@ class TpMove:
     ``wrist``: Wjnt; ``problem``: code and reason for which it is not corrected; ``skip``: label to which it may lead.
     ``head``: start and stop of the letter of its form in the text of the statement; ``alters``: what it does beside
     its path (TB, TA, DB) may set registers; ``relative``: its target counts from where the robot is (INC);
-    ``called``: the program that it calls beside its path; ``paced``: an option changes its speed (PSPD).
+    ``called``: the program that it calls beside its path; ``paced``: an option changes its speed (PSPD);
+    ``linear``: RT where it leaves its start in a line (RT_LD), AP where it comes to its target in one (AP_LD).
     """
 
     form: bytes
@@ -67,6 +68,7 @@ class TpMove:
     relative: bool = False
     called: str = ""
     paced: bool = False
+    linear: frozenset[bytes] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)

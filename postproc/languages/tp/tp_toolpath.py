@@ -112,7 +112,9 @@ def _not_before(rows: TpRows, continues: Bools, refused: Mapping[int, Finding]) 
         if not continues[row]:
             no_insert_before[row] = OTHER_PATHS
         elif move.own:
-            no_insert_before[row] = "its options count from its own start (TB, TA, DB, Arc Start)"
+            no_insert_before[row] = (
+                "its options count from its own start (TB, TA, DB, RT_LD, AP_LD, Arc Start)"
+            )
         elif move.unit in (b"sec", b"msec"):
             no_insert_before[row] = "its time is stated"
         elif move.form == b"J":
