@@ -85,7 +85,10 @@ def _angles(model: Mechanics) -> Iterator[Finding]:
         for pose in (link.before, link.after):
             x, z = pose.rotation[:, 0], pose.rotation[:, 2]
             sizes = np.arccos(np.clip(z[2], -1.0, 1.0)), np.arctan2(x[1], x[0])
-            stated += [(f"geometry: an angle of link {index + 1}", float(angle) / DEG) for angle in sizes]
+            stated += [
+                (f"geometry: an angle of the frame of joint {index + 1}", float(angle) / DEG)
+                for angle in sizes
+            ]
     for what, angle in stated:
         if are_radians([round(angle, 9)]):
             message = f"{what} is {angle:.6g} deg, a round number if it is {angle:.6g} rad"
