@@ -453,7 +453,7 @@ CASES: list[Case] = [
     *(
         Case(f"step into a turn, r {r:g}, {n} motions{', ramp 20' if ramp else ''}", step_into_a_turn(r, n, ramp),
              judged="position")
-        for r, n, ramp in ((4, 1, ""), (4, 1, "force_ramp: 20\n"), (2, 1, ""), (4, 36, "force_ramp: 20\n"))
+        for r, n, ramp in ((4, 1, ""), (4, 1, "force_ramp: 20\n"), (8, 1, ""), (4, 36, "force_ramp: 20\n"))
     ),
     *(Case(f"helix, {n} turns", helix(n), judged="position") for n in (1, 4)),
     Case("corners, tolerance 10, no insertions", lambda f: _loose(f), ("--no-insert",), wanted="not worse"),
