@@ -139,6 +139,7 @@ MISTAKES = [
     Mistake("mass in tonnes", [cell("axis: +z", "axis: +z, mass: 0.042, com: [0, 0, 99]")], RUN, 3, ["tonnes"]),
     Mistake("com in metres", [cell("axis: +z", "axis: +z, mass: 42, com: [0, 0, 0.1]")], RUN, 3, ["com", "metres"]),
     Mistake("cutter in metres", [cell("axis: +z", "axis: +z, diameter: 0.016")], RUN, 3, ["diameter in metres", "16"]),
+    Mistake("ramp in metres", [added("force_ramp: 0.008\n")], RUN, 3, ["CEL005", "force_ramp", "8"]),
     Mistake("tolerance in um", [cell(TOLERANCE, "tolerance: 20")], RUN, 3, ["CEL007", "0.02"]),
     Mistake("angle tolerance", [added("tolerance_deg: 10\n")], RUN, 3, ["CEL007"]),
     Mistake("axis turned round", [cell("axis: +z", "axis: -z")], RUN, 3, ["CEL006", "change its sign"]),

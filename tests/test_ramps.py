@@ -101,6 +101,34 @@ def test_a_force_of_one_size_is_nowhere_larger_where_the_path_turns(tmp_path, ra
     assert task.force.max_force < size * (1 + 1e-6)
 
 
+@pytest.mark.parametrize("early", [0.3, 1.0])
+@pytest.mark.parametrize("motion", ["arc", "polyline"])
+@pytest.mark.parametrize("length", [3e-3, 20e-3])
+def test_a_force_that_goes_over_before_its_corner_is_nowhere_larger(tmp_path, motion, early, length):
+    """The corner ends a half circle, over which the ramp leads backwards."""
+    turn = np.linspace(0.0, np.pi, 37)[1:]
+    half = [f"X{4 * (1 - np.cos(a)):.4f} Y{4 * np.sin(a):.4f}" for a in turn]
+    half = ["G2 X8. Y0. I4. J0."] if motion == "arc" else half
+    body = [
+        "G21 G90 G17 G54",
+        "T1 M6",
+        "G0 X0. Y-40. Z20.",
+        "G1 Z0. F600",
+        "G1 Y0.",
+        *half,
+        "G1 X60. Y0.",
+        "Z20.",
+    ]
+    task = prepare(Request(gcode(*body)(tmp_path), force="250,80,0@feed")).task
+    rows = task.force.ramps.steps()[0]
+    bare = replace(task.force, ramps=None, steps=task.force.steps | np.isin(np.arange(len(task.force)), rows))
+    every = np.full(len(rows), length), task.desired_path.length, np.full(len(rows), early)
+    cut = np.flatnonzero(task.carries)
+    at, share = np.repeat(cut, 101), np.tile(np.linspace(0.0, 1.0, 101), len(cut))
+    found = np.linalg.norm(bare.ramped(rows, *every).along(at, share)[:, :3], axis=1)
+    assert found.max() < np.hypot(250.0, 80.0) * (1 + 1e-6)
+
+
 @pytest.mark.parametrize("motion", ["arc", "polyline"])
 def test_the_smaller_a_step_the_less_the_force_differs(tmp_path, motion):
     """Where the force turns with the path behind it."""

@@ -384,6 +384,8 @@ def test_a_value_and_its_interval_keep_their_digits(size, share, word, of_95, si
         assert read.interval == pytest.approx(width, rel=1e-4 if of_95 else 1.1e-9)
     exponents = re.findall(r"(?:value|ci|ci95): (-?[0-9.]+)(?:e(-?[0-9]+))?,", text)
     assert all(not exponent or int(exponent) % 3 == 0 for _, exponent in exponents)
+    mantissa, exponent = exponents[0]
+    assert not exponent or 0.1 <= abs(float(mantissa)) < 100.0
     assert all(len(re.sub("[-.]", "", digits).strip("0")) <= 11 for digits, _ in exponents)
     # written once more it stays as it is
     again = WrittenParameter.of("p", si, read)

@@ -25,7 +25,7 @@ TONNES, GRAMS = 0.5, 1000.0
 LARGE_TOLERANCE, LARGE_ANGLE = 5.0 * MM, 2.0 * DEG
 """Tolerances above these leave nothing to be corrected."""
 THIN = 0.1 * MM
-"""Cutters are thicker."""
+"""Cutters are thicker, and forces change along a longer path."""
 BEHIND, BESIDE = -1.0 * MM, 150.0 * MM
 """A tool centre point behind the flange's face, and nearer to its axis than this, is inside the wrist."""
 POINTS_BACK = -0.5
@@ -57,6 +57,11 @@ def implausible(top: YamlSection, cell: Cell) -> tuple[Finding, ...]:
     if cell.tolerance_angle > LARGE_ANGLE:
         message = f"an error of {cell.tolerance_angle / DEG:g} deg leaves nothing to be corrected"
         found.append(_finding(top, "CEL007", message, "tolerance_deg", "write it in deg, for example 0.01"))
+    if cell.force_ramp is not None and 0.0 < cell.force_ramp < THIN:
+        short = cell.force_ramp / MM
+        message = f"no force changes along {short:g} mm of path; is the length in metres?"
+        help = f"lengths are in mm; from metres this is {1000.0 * short:g}"
+        found.append(_finding(top, "CEL005", message, "force_ramp", help))
     return tuple(found)
 
 
