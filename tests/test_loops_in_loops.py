@@ -86,7 +86,7 @@ def test_data_of_main_alone_makes_no_further_run(monkeypatch):
     starts = []
     start = FlowRunner.start
     monkeypatch.setattr(FlowRunner, "start", lambda runner: (starts.append(0), start(runner)))
-    body = b"VAR num a;\nConfL\\On;\na:=3;\nFOR i FROM 1 TO 3 DO\na:=i;\nENDFOR\n"
+    body = b"VAR num a;\nConfL\\Off;\na:=3;\nFOR i FROM 1 TO 3 DO\na:=i;\nENDFOR\n"
     raw = b"MODULE m\nPROC main()\n" + body + b"ENDPROC\nENDMODULE\n"
     Propagation(ModuleParser(raw).file(), raw).run()
     assert len(starts) == 2

@@ -326,8 +326,8 @@ def test_a_force_in_the_tool_turns_with_it() -> None:
     path, _, ways = part_circle(PATH)
     base = np.tile(TURNED.rotation, (3, 1, 1))
     frames = Turning(
-        np.array([False, False, True]), np.zeros(3, bool), None, base, path.rotation,
-        lambda rows: path.arcs.turn(rows, base[rows]),
+        np.array([False, False, True]), np.zeros(3, bool), np.array([False, False, True]), None, base,
+        path.rotation, lambda rows: path.arcs.turn(rows, base[rows]),
     )  # fmt: skip
     force = np.array([100.0, 20, -50, 1, 2, 3])
     row = np.array([2])
