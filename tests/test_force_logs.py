@@ -275,6 +275,30 @@ def test_a_log_that_goes_on_is_told(tmp_path):
     assert "FRC027" not in codes(run(STRAIGHT, log(tmp_path, s[:353], s[:353])))
 
 
+def test_forces_behind_the_path_are_of_a_cut_that_was_shifted(tmp_path):
+    """A pause of half a percent in the middle: the log ends with a cut that the path does not have any more."""
+    s = np.arange(0, 352.5, 0.25)
+    assert "FRC027" not in codes(run(STRAIGHT, log(tmp_path, s, np.where(s > 350.4, 5, 100))))
+    finding = told(run(STRAIGHT, log(tmp_path, s, np.where(s > 350.4, 20, 100))), "FRC027")
+    assert finding.message.endswith("; after it the log has forces up to 20 N")
+
+
+def test_motions_of_unknown_time_between_cuts_shift_what_is_behind_them(tmp_path):
+    """Not those before the first and behind the last cut, and no point that is there twice."""
+    places = [0, 0.1, 0.3, 0.35, 0.35, 0.4, 0.5]
+    kinds = [*PTP_THEN[:4], Kind.LIN, Kind.LIN, Kind.PTP]
+    path = path_of([[x, 0, 0] for x in places], kinds).with_columns(feed=np.full(7, 0.001))
+    t = np.arange(0.0, 401)
+    result = run(path, log(tmp_path, t, 0 * t + 100, "t_s"))
+    assert {"FRC047", "FRC028"}.isdisjoint(codes(result))
+    path = path_of([[x, 0, 0] for x in places], [*kinds[:5], Kind.PTP, Kind.LIN])
+    rapid = path.with_columns(feed=np.where(path.kind == Kind.PTP, np.nan, 0.001))
+    t = np.arange(0.0, 451)
+    finding = told(run(rapid, log(tmp_path, t, 0 * t + 100, "t_s")), "FRC047")
+    assert (finding.severity, finding.line) == ("warning", 15)
+    assert finding.message.startswith("1 motions between cuts state no feed")
+
+
 def test_without_a_feed_there_is_no_time(tmp_path):
     path = STRAIGHT.with_columns(feed=np.array([np.nan, 0.02, np.nan, 0.0]))
     (finding,) = refused(path, log(tmp_path, S, S, "t_s"))

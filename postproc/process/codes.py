@@ -250,16 +250,14 @@ FORCE_CODES = define(
             "log longer than the path",
             meaning="The rest of the log is not used.",
             consequence="The log may belong to another program.",
-            action="Check that it is the log of this program.",
-            example="A log over 5 m for a path of 3 m.",
+            action="Check that it is the log of this program, and that nothing in between takes time or path that "
+            "the scale does not count: dwells, halts, motions without a feed.",
+            example="A log over 5 m for a path of 3 m; a log over t_s of a program with G4.",
         ),
         "FRC028": Code(
             "info",
             "motions that take no part of the log",
-            meaning=(
-                "Rotations on the spot and moves to axis positions have no path length; moves without a"
-                " feed have no known time."
-            ),
+            meaning="Rotations on the spot and moves to axis positions have no path length.",
             consequence="No reading of the log belongs to them.",
             action="Nothing needs to be done if they are in air.",
             example="A PTP to an axis position.",
@@ -411,6 +409,15 @@ FORCE_CODES = define(
             consequence="The correction is wrong by as much.",
             action="State ktc, krc, kac in N/mm2 and kte, kre, kae in N/mm.",
             example="`ktc: 0.78`: that is 780 N/mm2 in kN/mm2.",
+        ),
+        "FRC047": Code(
+            "warning",
+            "motions of unknown time between cuts",
+            meaning="A log over t_s counts the time at the programmed feed; rapid motions, rotations on the spot and "
+            "moves to axis positions state none.",
+            consequence="The forces after them are shifted along the path by the time that they took.",
+            action="Record the log over s_mm, or state the forces by line.",
+            example="A log over t_s of a program with G0 between two cuts.",
         ),
     }
 )

@@ -2,7 +2,8 @@
 
 ``s_mm`` counts along the programmed path from the first known point on: lines and arcs by their length, point-to-point
 motions by the straight line between their ends, moves from and to axis positions and turns on the spot not at all.
-``t_s`` counts the time at the programmed feed; motions without a feed (point to point) take none.
+``t_s`` counts the time at the programmed feed; motions without a feed (point to point) take none, so that between cuts
+they shift what is behind them.
 """
 
 from __future__ import annotations
@@ -26,11 +27,16 @@ from postproc.process.stated_forces import StatedForces
 from postproc.process.wrenches import is_air
 from postproc.toolpath import Toolpath
 
+_SAME = 1e-9
+
 UNITS = {"s_mm": MM, "t_s": 1.0}
 """Column -> its unit in SI."""
 
 GAP = 10.0
 """Readings this many times further apart than usual leave a gap."""
+
+CUTS = 0.1
+"""A reading after the path of more than this share of the largest force on it is of a cut."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +81,7 @@ def read_log(
     within = slice(
         *(int(np.searchsorted(place, *edge)) for edge in ((0.0, "left"), (scale.end[-1], "right")))
     )
-    spacing = _check_extent(table, place, scale, findings)
+    spacing = _check_extent(table, place, scale, channels[:, :3], findings)
     in_air = np.zeros(len(place), bool)
     in_air[within] = scale.air[owner[within]]
     channels = checked_gauge(table, channels, in_air, offset, findings)
@@ -134,13 +140,31 @@ def _scale(
     uncounted &= (index > (cutting[0] if len(cutting) else len(index))) & (
         index < (cutting[-1] if len(cutting) else 0)
     )
-    if np.any(uncounted):
-        what = f"motions do not advance {column} (rotations on the spot, axis positions"
-        what += ", moves without a feed)" if column == "t_s" else ")"
-        row = int(np.argmax(uncounted))
-        findings.append(Finding("FRC028", f"{uncounted.sum()} {what}", program, int(toolpath.line[row])))
+    findings += _uncounted_findings(column, np.flatnonzero(uncounted), path_length, toolpath, program)
     end = np.cumsum(extent)
     return Scale(end - extent, end, air, column)
+
+
+def _uncounted_findings(
+    column: str, rows: Ints, path_length: PathLength, toolpath: Toolpath, program: str
+) -> list[Finding]:
+    """Of motions ``rows`` (K,) between cuts that take no part of the scale."""
+    if column == "t_s":
+        turn = np.abs(toolpath.rotation[rows] - toolpath.rotation[rows - 1]).max(axis=(1, 2))
+        rests = (path_length.known & path_length.starts)[rows] & ~path_length.moved[rows] & (turn < _SAME)
+        rows = rows[~rests]
+    if not len(rows):
+        return []
+    line = int(toolpath.line[rows[0]])
+    if column == "s_mm":
+        what = f"{len(rows)} motions do not advance s_mm (rotations on the spot, axis positions)"
+        return [Finding("FRC028", what, program, line)]
+    what = (
+        f"{len(rows)} motions between cuts state no feed (rapid motions, rotations on the spot, axis positions), and"
+        " t_s does not count their time: the forces of all cuts after them are shifted by it"
+    )
+    help = "record the log over s_mm, or state the forces by line"
+    return [Finding("FRC047", what, program, line, help=help)]
 
 
 def _check_order(table: CsvTable, column: str, place: Floats) -> None:
@@ -163,8 +187,11 @@ def _one_frame(table: CsvTable) -> int:
     return int(frame[0])
 
 
-def _check_extent(table: CsvTable, place: Floats, scale: Scale, findings: list[Finding]) -> float:
-    """The usual distance of readings; Refusal FRC019 where they do not cover the cutting part of the path."""
+def _check_extent(
+    table: CsvTable, place: Floats, scale: Scale, force: Floats, findings: list[Finding]
+) -> float:
+    """The usual distance of readings; Refusal FRC019 where they do not cover the cutting part of the path.  ``force``
+    (M, 3) [N]: theirs."""
     steps = np.diff(place)
     spacing = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
     rows = scale.cutting
@@ -195,9 +222,14 @@ def _check_extent(table: CsvTable, place: Floats, scale: Scale, findings: list[F
                 help="use the log of this program, from its first motion on",
             )
         )
-    if place[-1] > whole + max(2 * spacing, 0.01 * whole):
+    size = np.linalg.norm(force, axis=1)
+    behind = place > whole + 2 * spacing
+    cuts = size[behind].max(initial=0.0) > CUTS * size[~behind].max(initial=0.0)
+    if cuts or place[-1] > whole + max(2 * spacing, 0.01 * whole):
         row = int(np.argmax(place > whole + 1e-6 * spacing))
         what = f"the log continues to {scale.show(place[-1])}, and the path ends at {scale.show(whole)}"
+        if cuts:
+            what += f"; after it the log has forces up to {size[behind].max():.0f} N"
         findings.append(Finding("FRC027", what, str(table.path), int(table.lines[row])))
     return spacing
 
