@@ -75,7 +75,10 @@ def test_the_largest_distance_is_the_one_with_which_the_worst_corner_has_the_tol
     late = np.where(np.arange(many) == 1, 1.0, 0.0)
     distance = np.full(many, 50e-3)
 
+    tried = []
+
     def compared(words: float, motion: np.ndarray) -> SimpleNamespace:
+        tried.append(words)
         return SimpleNamespace(difference=words * share[motion] + late[motion] * max(words - 1e-3, 0.0))
 
     monkeypatch.setattr(unknown_distance, "with_distance", lambda task, division, distance: (distance,))
@@ -83,8 +86,13 @@ def test_the_largest_distance_is_the_one_with_which_the_worst_corner_has_the_tol
     corners = SimpleNamespace(motion=np.arange(many), unknown=np.ones(many, bool), distance=distance)
     exact = min(job.tolerance / share.max(), (job.tolerance + 1e-3) / (share[1] + 1.0))
     found = largest_distance(job, division, corners)  # type: ignore[arg-type]
-    assert 0.9 * exact < found <= exact
-    late[:], share[:] = 0.0, 1e-5
+    assert 0.96 * exact < found <= exact
+    late[:] = 0.0
+    tried.clear()
+    found = largest_distance(job, division, corners)  # type: ignore[arg-type]
+    assert 0.96 < found / (job.tolerance / share.max()) <= 1
+    assert len(tried) <= 4
+    share[:] = 1e-5
     assert largest_distance(job, division, corners) == 50e-3  # type: ignore[arg-type]
     share[many - 1] = np.inf
     assert largest_distance(job, division, corners) == 0.0  # type: ignore[arg-type]
