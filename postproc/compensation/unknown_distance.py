@@ -42,9 +42,9 @@ def largest_distance(task: CompensationProblem, division: Subdivision, corners: 
     some = np.argsort(-at_first, kind="stable")[:CLOSEST]
     off, found = at_high, high
     for _ in range(ROUNDS):
-        search = _Search(0.0, 0.0, found, off[some].max())
+        search = _DistanceSearch(0.0, 0.0, found, off[some].max())
         if first < found:
-            search = search.tried(first, at_first[some].max())
+            search = replace(search.tried(first, at_first[some].max()), slow=False)
         for _ in range(STEPS):
             if search.is_near:
                 break
@@ -61,7 +61,7 @@ def largest_distance(task: CompensationProblem, division: Subdivision, corners: 
 
 
 @dataclass(frozen=True)
-class _Search:
+class _DistanceSearch:
     """Distances [m] ``low``, at which all is within the tolerance, and ``high``, at which not, with the largest that is
     off there, shares of the tolerance; between them it is taken for a power of the distance, but after a ``slow`` step,
     by which they came no nearer to each other than half."""
@@ -89,7 +89,7 @@ class _Search:
         middle = self.low * (aim / self.off_low) ** (1.0 / max(power, 0.1))
         return float(np.clip(middle, self.low, self.high))
 
-    def tried(self, distance: float, off: float) -> _Search:
+    def tried(self, distance: float, off: float) -> _DistanceSearch:
         """With what is off at a ``distance`` [m] between the two."""
         width, slow = self.high - self.low, not self.slow
         if off <= 1:
