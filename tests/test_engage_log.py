@@ -51,6 +51,20 @@ def test_the_bias_of_a_log_is_that_of_the_cut_that_yields(folder):
     assert share == pytest.approx(expected, abs=2)
 
 
+@pytest.mark.slow
+def test_the_nominal_force_of_the_part_is_the_largest_of_the_program(folder):
+    """A plunge before a slot, where a ramp takes most of its force: the report names one largest force."""
+    text = "G21 G90 G17 G54\nT1 M6\nG0 X20 Y40 Z5\nG1 Z-2 F3600\nY-5\nG0 Z30\nM2\n"
+    (folder / "part.ngc").write_text(text)
+    result = CliRunner().invoke(
+        main, ["program", str(folder / "part.ngc"), "--force=", "-o", str(folder / "out")]
+    )
+    assert result.exit_code in (0, 3), result.output
+    report = json.loads((folder / "out" / "part.report.json").read_text())
+    posted = report["part_error_mm"]["as_posted"]
+    assert posted["nominal_force_max_n"] == pytest.approx(report["force"]["max_n"], abs=1e-3)
+
+
 def test_without_a_stock_the_bias_is_said_to_be_unknown(folder):
     cell = folder / "cell.yaml"
     cell.write_text(cell.read_text().replace("process: milling.yaml", ""))

@@ -138,7 +138,8 @@ def find_part_error(
 def _cut_forces(task: CompensationProblem, nominal: _Nominal, solved: CoupledEngagement | str) -> CutForces:
     """The forces of a side against those of the nominal engagement."""
     motions = np.unique(nominal.paths.motion)
-    ends = [task.force.along(motions, np.full(len(motions), share)) for share in (0.0, 1.0)]
+    # what the ends have before ramps take a part of it, as in all that the report says of the force
+    ends = [task.force.start[motions], task.force.values[motions]]
     if task.force.ramps is not None:
         row, share = task.force.ramps.ends()
         near = np.isin(row, motions)
