@@ -243,3 +243,26 @@ def test_external_axes_are_not_claimed_that_may_be_left_out_of_motions(how: str,
     before, after = read(text).toolpath.external[:, 0]
     assert before == 50.0
     assert (after == 50.0) == (how == "assignment" and again != "")
+
+
+@pytest.mark.parametrize("endless", [True, False])
+@pytest.mark.parametrize("resumes", [True, False])
+def test_after_a_subprogram_that_an_interrupt_ends_a_motion_starts_anywhere(
+    endless: bool, resumes: bool
+) -> None:
+    """Whether the subprogram has an end of its own or not: without both nothing after its call is reached."""
+    body = f"LOOP\nLIN {MOVED}\nENDLOOP\n" if endless else f"LIN {MOVED}\n"
+    resume = "BRAKE\nRESUME\n" if resumes else ""
+    later = WHEN["interrupt"].format("isr()")
+    text = f"{HEAD}{later}LIN {FULL}\nwork()\nLIN {FULL}\nLIN {MOVED}\nEND\n"
+    program = read(f"{text}DEF work()\n{body}END\nDEF isr()\n{resume}END\n")
+    path = program.toolpath
+    after = HEAD.count("\n") + later.count("\n") + 3
+    assert path.line.tolist()[2:] == [after, after + 1]
+    before = path.sequence.predecessors.get(2, (1,))
+    assert (-2 in before) is resumes  # -2: elsewhere than any motion ends
+    assert 1 in before or (endless and not resumes)
+    is_reached = resumes or not endless
+    assert path.known[2:].tolist() == [is_reached] * 2
+    assert path.continues[3] == is_reached
+    assert [one.line for one in program.findings if one.code == "KRL023"] == ([] if is_reached else [after])
