@@ -266,3 +266,18 @@ def test_after_a_subprogram_that_an_interrupt_ends_a_motion_starts_anywhere(
     assert path.known[2:].tolist() == [is_reached] * 2
     assert path.continues[3] == is_reached
     assert [one.line for one in program.findings if one.code == "KRL023"] == ([] if is_reached else [after])
+
+
+@pytest.mark.parametrize(
+    ("statement", "is_known"),
+    [("N=1", True), ("N=W.X", True), ("W.X=3", False), ("N=change(W)", False), ("N=elsewhere(W)", False)],
+)
+def test_what_changes_one_of_two_names_of_a_variable_changes_the_other(
+    statement: str, is_known: bool
+) -> None:
+    """Where a parameter comes back it may be the variable that some call hands over; what is only read stays."""
+    sub = f"GLOBAL DEF sub(W:OUT)\nDECL FRAME W\nDECL INT N\nBAS(#BASE,1)\nBAS(#TOOL,1)\nP={FULL}\n{statement}\nLIN P\nEND\n"
+    change = f"DEFFCT INT change(V:OUT)\nDECL FRAME V\nV={MOVED}\nRETURN 1\nENDFCT\n"
+    program = read(f"DEF part()\nEND\nGLOBAL DEF other()\nsub(P)\nEND\n{sub}{change}")
+    assert program.toolpath.known.tolist() == [is_known]
+    assert [one.line for one in program.findings if one.code == "KRL002"] == ([] if is_known else [13])
