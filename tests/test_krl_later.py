@@ -276,7 +276,8 @@ def test_what_changes_one_of_two_names_of_a_variable_changes_the_other(
     statement: str, is_known: bool
 ) -> None:
     """Where a parameter comes back it may be the variable that some call hands over; what is only read stays."""
-    sub = f"GLOBAL DEF sub(W:OUT)\nDECL FRAME W\nDECL INT N\nBAS(#BASE,1)\nBAS(#TOOL,1)\nP={FULL}\n{statement}\nLIN P\nEND\n"
+    head = "GLOBAL DEF sub(W:OUT)\nDECL FRAME W\nDECL INT N\nBAS(#BASE,1)\nBAS(#TOOL,1)\n"
+    sub = f"{head}P={FULL}\n{statement}\nLIN P\nEND\n"
     change = f"DEFFCT INT change(V:OUT)\nDECL FRAME V\nV={MOVED}\nRETURN 1\nENDFCT\n"
     program = read(f"DEF part()\nEND\nGLOBAL DEF other()\nsub(P)\nEND\n{sub}{change}")
     assert program.toolpath.known.tolist() == [is_known]
