@@ -57,10 +57,10 @@ Words = tuple[tuple[str, float], ...]
 """Points: beside the vertex or the end of the ramp, and how many before (less than 0) or after it."""
 
 
-def _points(*many: int) -> Words:
-    """So ``many`` points before and after the vertex, and before and after the end of the ramp, besides both."""
-    sides = ((_V, *many[:2]), (_E, *many[2:]))
-    return tuple((at, float(k)) for at, before, after in sides for k in range(-before, after + 1))
+def _points(before: int, after: int, before_end: int, after_end: int) -> Words:
+    """So many points before and after the vertex, and before and after the end of the ramp, besides both."""
+    sides = ((_V, before, after), (_E, before_end, after_end))
+    return tuple((at, float(k)) for at, low, high in sides for k in range(-low, high + 1))
 
 
 STARTS: tuple[tuple[Words, ...], ...] = (
