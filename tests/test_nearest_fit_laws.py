@@ -112,6 +112,38 @@ def test_a_fit_is_taken_where_it_takes_a_tenth_away(share, is_taken, monkeypatch
     assert (division is not plain) is is_taken
 
 
+@pytest.mark.parametrize("better", [0, 1])
+def test_of_two_corners_that_keeps_its_fit_that_takes_a_tenth_away(better, monkeypatch):  # type: ignore[no-untyped-def]
+    """The other one, and its motions, are as they were without a fit."""
+    force, start = np.zeros((5, 6)), np.zeros((5, 6))
+    force[2:, 0], start[2:, 0] = [100.0, 900.0, 900.0], [100.0, 100.0, 900.0]
+    points = np.array([[-60.0, 0, 20], [-60.0, 0, 0], [0, 0, 0], [60.0, 0, 0], [120.0, 0, 0]]) * MM
+    across = np.array([[0.0, 0.0, 0.0], [2e-6, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    blend = np.array([0.0, 0.0, 4.0, 4.0, 4.0]) * MM
+    job = spring(
+        points, [False, False, True, True, True], across, force[:, :3], start=start, approximation=blend
+    )
+    turn = 2e-6 * 800.0 / 60e-3
+    job = replace(job, tolerance=turn * 4e-3 / 4 / 1.5 / 0.9)
+    before = np.where(np.arange(2) == better, 2.5, 1.05) * 0.75
+
+    class Known(PointChooser):
+        def choose(self, remaining=0.0):  # type: ignore[no-untyped-def]
+            return replace(super().choose(remaining), before=before)
+
+    monkeypatch.setattr(corner_fit, "PointChooser", Known)
+    result = correct(job)
+    plain = subdivide(job, result, FREE)
+    division = fit_corners(job, result, plain, FREE)[1]
+    assert division.fits is not None
+    assert np.unique(division.source[division.fits.corner]).tolist() == [2 + better]
+    other = 3 - better
+    places = [
+        one.command[np.flatnonzero((one.source == other) & (one.share == 1.0))] for one in (plain, division)
+    ]
+    np.testing.assert_array_equal(*(one.position for one in places))
+
+
 @pytest.mark.parametrize("known", [True, False])
 def test_inserted_points_before_an_exact_end_go_by_the_motion_before(known):  # type: ignore[no-untyped-def]
     """They are approximated as that is: where its distance is not known they stay where they are."""
