@@ -256,6 +256,7 @@ def test_no_step_in_a_cut_is_too_small_or_too_large_for_a_ramp(component, size):
         ("reachable", [2], False),
         ("tool", [3, 4], 0),
         ("tool", [0, 1], 0),
+        ("kind", [2], Kind.CIRC),  # whose path is not known: nothing states through where
         ("branch", [1, 4], -1),
         ("reachable", [0, 1, 4], False),
     ],
@@ -263,16 +264,16 @@ def test_no_step_in_a_cut_is_too_small_or_too_large_for_a_ramp(component, size):
 def test_a_step_keeps_its_place_where_its_vertex_is_not_known(column, rows, value):
     """What the correction would be there, with both forces, is known only from the motions beside it."""
     task = stepped()
-    if column == "tool":
-        tool = task.toolpath.tool.copy()
-        tool[rows] = value
-        task = replace(task, toolpath=task.toolpath.with_columns(tool=tool))
+    if column in ("tool", "kind"):
+        values = getattr(task.toolpath, column).copy()
+        values[rows] = value
+        task = replace(task, toolpath=task.toolpath.with_columns(**{column: values}))
     else:
         values = getattr(task.track, column).copy()
         values[rows] = value
         task = replace(task, track=replace(task.track, **{column: values}))
     ramped = add_force_ramps(task, 5e-3)
-    beside = {2, 3} if column == "reachable" else {3}
+    beside = {2, 3} if column in ("reachable", "kind") else {3}
     assert (ramped is task) == bool(beside & set(rows))
 
 
