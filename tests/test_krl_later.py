@@ -282,3 +282,16 @@ def test_what_changes_one_of_two_names_of_a_variable_changes_the_other(
     program = read(f"DEF part()\nEND\nGLOBAL DEF other()\nsub(P)\nEND\n{sub}{change}")
     assert program.toolpath.known.tolist() == [is_known]
     assert [one.line for one in program.findings if one.code == "KRL002"] == ([] if is_known else [13])
+
+
+@pytest.mark.parametrize("interrupted", [True, False])
+def test_after_a_function_the_next_motion_starts_where_the_one_before_ends_but_for_interrupts(
+    interrupted: bool,
+) -> None:
+    later = WHEN["interrupt"].format("isr()") if interrupted else ""
+    count = "DEFFCT INT count()\nRETURN 1\nENDFCT\n"
+    text = f"{HEAD}DECL INT N\n{later}LIN {FULL}\nN=count()\nLIN {MOVED}\nEND\n{count}"
+    program = read(f"{text}DEF isr()\nBRAKE\nRESUME\nEND\n")
+    assert program.toolpath.known.all()
+    before = program.toolpath.sequence.predecessors[1]
+    assert before == ((-2, 0) if interrupted else (0,))  # -2: elsewhere than any motion ends
