@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from path_cases import line
+from path_cases import line, task
 
 from postproc.compensation.ramped_forces import STEEPEST, add_force_ramps
 from postproc.process import Wrenches
@@ -131,9 +131,17 @@ def ahead_of(task, row, share):
     return made.command.position @ task.desired_path.tangent(rows[:1], np.zeros(1))[0]
 
 
+def slanting():
+    """A cut whose feed lies along no axis."""
+    start, end = np.array([1.45, -0.3, 0.45]), np.array([1.7, 0.25, 0.55])
+    up = np.array([0, 0, 0.1])
+    return task([start + up, start, end, end + up], [False, False, True, False])
+
+
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_no_correction_goes_back_where_a_force_along_the_feed_changes_at_once(sign):
-    task = line()
+@pytest.mark.parametrize("path", [line, slanting])
+def test_no_correction_goes_back_where_a_force_along_the_feed_changes_at_once(sign, path):
+    task = path()
     row = int(np.flatnonzero(task.carries)[-1])
     length = task.desired_path.length[row]
     share = np.array([0.0, 0.3, 0.5, 0.5 + 1e-3 / length, 0.9, 1.0])

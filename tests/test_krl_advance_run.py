@@ -45,6 +45,8 @@ STOPS = [
     "SWITCH $ANIN[1]\nCASE 1\nI=2\nENDSWITCH",
     "SUCTION()",
     "CONTINUE\nI=2\n$OUT[7]=TRUE",
+    "B1=TRUE\n$OUT[7]=TRUE",
+    "BAS(#VEL_CP,0.02)\n$OUT[7]=TRUE",
     "IF I==1 THEN\n$OUT[7]=TRUE\nENDIF",
 ]
 FLOWS = [

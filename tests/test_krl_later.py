@@ -243,3 +243,55 @@ def test_external_axes_are_not_claimed_that_may_be_left_out_of_motions(how: str,
     before, after = read(text).toolpath.external[:, 0]
     assert before == 50.0
     assert (after == 50.0) == (how == "assignment" and again != "")
+
+
+@pytest.mark.parametrize("endless", [True, False])
+@pytest.mark.parametrize("resumes", [True, False])
+def test_after_a_subprogram_that_an_interrupt_ends_a_motion_starts_anywhere(
+    endless: bool, resumes: bool
+) -> None:
+    """Whether the subprogram has an end of its own or not: without both nothing after its call is reached."""
+    body = f"LOOP\nLIN {MOVED}\nENDLOOP\n" if endless else f"LIN {MOVED}\n"
+    resume = "BRAKE\nRESUME\n" if resumes else ""
+    later = WHEN["interrupt"].format("isr()")
+    text = f"{HEAD}{later}LIN {FULL}\nwork()\nLIN {FULL}\nLIN {MOVED}\nEND\n"
+    program = read(f"{text}DEF work()\n{body}END\nDEF isr()\n{resume}END\n")
+    path = program.toolpath
+    after = HEAD.count("\n") + later.count("\n") + 3
+    assert path.line.tolist()[2:] == [after, after + 1]
+    before = path.sequence.predecessors.get(2, (1,))
+    assert (-2 in before) is resumes  # -2: elsewhere than any motion ends
+    assert 1 in before or (endless and not resumes)
+    is_reached = resumes or not endless
+    assert path.known[2:].tolist() == [is_reached] * 2
+    assert path.continues[3] == is_reached
+    assert [one.line for one in program.findings if one.code == "KRL023"] == ([] if is_reached else [after])
+
+
+@pytest.mark.parametrize(
+    ("statement", "is_known"),
+    [("N=1", True), ("N=W.X", True), ("W.X=3", False), ("N=change(W)", False), ("N=elsewhere(W)", False)],
+)
+def test_what_changes_one_of_two_names_of_a_variable_changes_the_other(
+    statement: str, is_known: bool
+) -> None:
+    """Where a parameter comes back it may be the variable that some call hands over; what is only read stays."""
+    head = "GLOBAL DEF sub(W:OUT)\nDECL FRAME W\nDECL INT N\nBAS(#BASE,1)\nBAS(#TOOL,1)\n"
+    sub = f"{head}P={FULL}\n{statement}\nLIN P\nEND\n"
+    change = f"DEFFCT INT change(V:OUT)\nDECL FRAME V\nV={MOVED}\nRETURN 1\nENDFCT\n"
+    program = read(f"DEF part()\nEND\nGLOBAL DEF other()\nsub(P)\nEND\n{sub}{change}")
+    assert program.toolpath.known.tolist() == [is_known]
+    assert [one.line for one in program.findings if one.code == "KRL002"] == ([] if is_known else [13])
+
+
+@pytest.mark.parametrize("interrupted", [True, False])
+def test_after_a_function_the_next_motion_starts_where_the_one_before_ends_but_for_interrupts(
+    interrupted: bool,
+) -> None:
+    later = WHEN["interrupt"].format("isr()") if interrupted else ""
+    count = "DEFFCT INT count()\nRETURN 1\nENDFCT\n"
+    text = f"{HEAD}DECL INT N\n{later}LIN {FULL}\nN=count()\nLIN {MOVED}\nEND\n{count}"
+    program = read(f"{text}DEF isr()\nBRAKE\nRESUME\nEND\n")
+    assert program.toolpath.known.all()
+    before = program.toolpath.sequence.predecessors[1]
+    assert before == ((-2, 0) if interrupted else (0,))  # -2: elsewhere than any motion ends

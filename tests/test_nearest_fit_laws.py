@@ -16,6 +16,7 @@ from postproc.compensation.corner_points import PointChooser
 from postproc.compensation.corners import rounded_errors
 from postproc.compensation.correct import correct
 from postproc.compensation.path_error import PathSegments, path_errors
+from postproc.compensation.rounded_path import RoundedOutput
 from postproc.compensation.subdivide import subdivide
 from postproc.toolpath import Role
 
@@ -110,6 +111,71 @@ def test_a_fit_is_taken_where_it_takes_a_tenth_away(share, is_taken, monkeypatch
     plain = subdivide(job, result, FREE)
     division = fit_corners(job, result, plain, FREE)[1]
     assert (division is not plain) is is_taken
+
+
+@pytest.mark.parametrize("axis", np.eye(3).tolist())
+def test_a_corner_of_the_orientation_is_fitted_as_one_of_the_place_is(axis) -> None:  # type: ignore[no-untyped-def]
+    """A tool that the force turns, evenly more from the vertex on: the parabola passes the turn there by k d / 4, of
+    which its own point takes half away."""
+    per_newton, axis = 2e-6, np.array(axis)
+    straight, _ = bending(4.0, 1.0)
+
+    class Turned(type(straight)):  # type: ignore[misc]
+        def simulated(self, rows, command, wrench, *more, **words):  # type: ignore[no-untyped-def]
+            found = super().simulated(rows, command, wrench, *more, **words)
+            turn = rotation_from_vector(per_newton * wrench[:, :1] * axis)
+            return replace(found, pose=Poses(turn @ command.rotation, found.pose.position))
+
+        def command(self, rows, wanted, wrench, goal, *more, **words):  # type: ignore[no-untyped-def]
+            found = super().command(rows, wanted, wrench, goal, *more, **words)
+            turn = rotation_from_vector(-per_newton * wrench[:, :1] * axis)
+            return replace(found, command=Poses(turn @ goal.rotation, found.command.position))
+
+    kept = {name: getattr(straight, name) for name in straight.__dataclass_fields__}
+    missed = per_newton * 800.0 / 60e-3 * 4e-3 / 4
+    # the place is off by as many metres, which is half of what is allowed
+    job = Turned(**{**kept, "tolerance": missed / 0.5 / 0.9, "tolerance_angle": missed / 1.5 / 0.9})
+    result = correct(job)
+    plain = subdivide(job, result, FREE)
+    division = fit_corners(job, result, plain, FREE)[1]
+    angles = [
+        RoundedOutput(job, one, np.array([2, 3])).largest(np.array([2, 3]))[1].max()
+        for one in (plain, division)
+    ]
+    assert angles[0] == pytest.approx(missed, rel=0.02)
+    assert angles[1] == pytest.approx(0.5 * missed, rel=0.05)
+
+
+@pytest.mark.parametrize("better", [0, 1])
+def test_of_two_corners_that_keeps_its_fit_that_takes_a_tenth_away(better, monkeypatch):  # type: ignore[no-untyped-def]
+    """The other one, and its motions, are as they were without a fit."""
+    force, start = np.zeros((5, 6)), np.zeros((5, 6))
+    force[2:, 0], start[2:, 0] = [100.0, 900.0, 900.0], [100.0, 100.0, 900.0]
+    points = np.array([[-60.0, 0, 20], [-60.0, 0, 0], [0, 0, 0], [60.0, 0, 0], [120.0, 0, 0]]) * MM
+    across = np.array([[0.0, 0.0, 0.0], [2e-6, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    blend = np.array([0.0, 0.0, 4.0, 4.0, 4.0]) * MM
+    job = spring(
+        points, [False, False, True, True, True], across, force[:, :3], start=start, approximation=blend
+    )
+    turn = 2e-6 * 800.0 / 60e-3
+    job = replace(job, tolerance=turn * 4e-3 / 4 / 1.5 / 0.9)
+    before = np.where(np.arange(2) == better, 2.5, 1.05) * 0.75
+
+    class Known(PointChooser):
+        def choose(self, remaining=0.0):  # type: ignore[no-untyped-def]
+            return replace(super().choose(remaining), before=before)
+
+    monkeypatch.setattr(corner_fit, "PointChooser", Known)
+    result = correct(job)
+    plain = subdivide(job, result, FREE)
+    division = fit_corners(job, result, plain, FREE)[1]
+    assert division.fits is not None
+    assert np.unique(division.source[division.fits.corner]).tolist() == [2 + better]
+    other = 3 - better
+    places = [
+        one.command[np.flatnonzero((one.source == other) & (one.share == 1.0))] for one in (plain, division)
+    ]
+    np.testing.assert_array_equal(*(one.position for one in places))
 
 
 @pytest.mark.parametrize("known", [True, False])

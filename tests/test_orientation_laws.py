@@ -80,7 +80,11 @@ def test_motions_with_three_words_or_none_are_no_pair():
 
 
 @pytest.mark.parametrize(
-    "leans", [(0.0, 8.0), (6.0, -4.0), (-0.5, 5.0), (20.0, 30.0), (5.0, 5.0), (179.0, 172.0), (-3.0, -0.1)]
+    "leans",
+    [
+        *((0.0, 8.0), (6.0, -4.0), (-0.5, 5.0), (20.0, 30.0), (5.0, 5.0), (179.0, 172.0), (-3.0, -0.1)),
+        *((30.0, 100.0), (100.0, 30.0), (150.0, 85.0)),
+    ],
 )
 @pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (0.3, 0.8)])
 def test_near_their_pole_shares_are_even_in_the_turn_of_the_outer_axis(leans, low, high):
@@ -95,7 +99,7 @@ def test_near_their_pole_shares_are_even_in_the_turn_of_the_outer_axis(leans, lo
     assert share[-1] == high
     steps = np.diff(share)
     assert (steps > 0).all()
-    pole = 180.0 if max(leans) > 90.0 else 0.0
+    pole = 180.0 if sum(leans) > 180.0 else 0.0
     even = np.arcsinh(leans[0] + share * (leans[1] - leans[0]) - pole) if leans[0] != leans[1] else share
     assert np.ptp(np.diff(even)) < 1e-9
     factor = shortest(job.toolpath, rows[:1], lows[:1], highs[:1])[0]

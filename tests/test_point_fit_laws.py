@@ -266,6 +266,34 @@ def test_points_on_a_path_that_rounds_off_nothing_are_off_nowhere(before: bool) 
     np.testing.assert_allclose(moved.off[0, inner], across[0, inner], atol=1e-6)
 
 
+@pytest.mark.parametrize("before", [True, False])
+@pytest.mark.parametrize("reach", [0.4 * MM, 0.7 * MM, 5.0 * MM])
+def test_points_that_are_rounded_off_between_two_arcs_are_off_as_the_blend_of_both_is(
+    reach: float, before: bool
+) -> None:
+    """From d before a point of a circle to d after it the place is (1 - u) of the one arc and u of the other: at the
+    parts 1 - u and u of d from the point, d no more than half of the shorter chord."""
+    radius = 10.0 * MM
+    chosen = round_a_circle(radius, before)
+    own = np.array([-6.0, -4.4, -2.0, 0.0, 1.0, 2.0, 6.0]) * MM
+    parameter, inner, vertex = (own, 2, 3) if before else (-own[::-1], 4, 3)
+    reaches = np.zeros((1, 7))
+    reaches[0, inner] = reach
+    found = evaluate_polygons(chosen, chosen.at(parameter[None])[0], reaches, None, parameter[None], vertex)
+    turns = np.diff(parameter)[[inner - 1, inner]] / radius
+    chords = 2.0 * radius * np.sin(0.5 * turns)
+    distance = min(reach, 0.5 * chords.min())
+    u = np.linspace(0.0, 1.0, 1001)
+    turned = [-(1.0 - u) * turns[0] * distance / chords[0], u * turns[1] * distance / chords[1]]
+    blend = (1.0 - u) * np.exp(1j * turned[0]) + u * np.exp(1j * turned[1])
+    off = radius * (1.0 - np.abs(blend))
+    assert found.largest[0] == pytest.approx(off.max(), rel=2e-2)
+    from_point = (found.parameter[0] - parameter[inner]) / radius
+    some = np.abs(from_point) < 0.99 * distance / radius
+    expected = np.interp(from_point[some], np.angle(blend), off)
+    np.testing.assert_allclose(np.linalg.norm(found.off[0, some], axis=1), expected, atol=1e-2 * off.max())
+
+
 def test_parameters_of_points_ascend_and_the_vertex_keeps_its_own() -> None:
     """Where a point has gone beyond its neighbour they have one place; none goes beyond the ends."""
     chosen = round_a_circle(10.0 * MM, True)

@@ -228,6 +228,8 @@ def test_no_correction_goes_back_faster_than_the_path_goes_on(sense):
     for ramp in (1e-3, 20e-3):
         length = add_force_ramps(task, ramp).force.ramps.length[0]
         assert length == pytest.approx(max(ramp, back / STEEPEST))
+    # what goes back by less than it goes on never stops
+    assert 0.5 < STEEPEST < 1.0
 
 
 @pytest.mark.parametrize("size", [1e-6, 0.1, 2.0])
@@ -244,6 +246,35 @@ def test_no_step_in_a_cut_is_too_small_or_too_large_for_a_ramp(component, size):
     assert np.abs(force[0] - values[2]).max() < 1e-9 * change + 1e-12
     assert np.abs(np.diff(force, axis=0)).max() < 0.2 * change
     assert not ramped.steps(np.array([3]), np.ones(5, bool))[0]
+
+
+@pytest.mark.parametrize(
+    ("column", "rows", "value"),
+    [
+        ("branch", [3], -1),
+        ("reachable", [3], False),
+        ("reachable", [2], False),
+        ("tool", [3, 4], 0),
+        ("tool", [0, 1], 0),
+        ("kind", [2], Kind.CIRC),  # whose path is not known: nothing states through where
+        ("branch", [1, 4], -1),
+        ("reachable", [0, 1, 4], False),
+    ],
+)
+def test_a_step_keeps_its_place_where_its_vertex_is_not_known(column, rows, value):
+    """What the correction would be there, with both forces, is known only from the motions beside it."""
+    task = stepped()
+    if column in ("tool", "kind"):
+        values = getattr(task.toolpath, column).copy()
+        values[rows] = value
+        task = replace(task, toolpath=task.toolpath.with_columns(**{column: values}))
+    else:
+        values = getattr(task.track, column).copy()
+        values[rows] = value
+        task = replace(task, track=replace(task.track, **{column: values}))
+    ramped = add_force_ramps(task, 5e-3)
+    beside = {2, 3} if column in ("reachable", "kind") else {3}
+    assert (ramped is task) == bool(beside & set(rows))
 
 
 def test_what_was_measured_and_what_does_not_change_keep_their_steps():

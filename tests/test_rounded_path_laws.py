@@ -198,6 +198,19 @@ def test_where_a_program_ends_in_its_cut_it_is_no_error_to_be_ahead():
     np.testing.assert_allclose(found.shift, 0.0, atol=1e-9)
 
 
+@pytest.mark.parametrize("distance", [0.0, 0.4, 3.0])
+def test_where_a_cut_is_entered_or_left_without_a_stop_it_is_an_error_to_be_ahead(distance):
+    """There the part shows it, as in a corner; with a stop, and inside of the cut, nothing marks it."""
+    points = np.array([[-60, 0, 0], [-50, 0, 0], [0, 0, 0], [70, 0, 0], [100, 0, 0]]) * MM
+    job = spring(points, [False, False, True, True, False], approximation=np.full(5, distance * MM))
+    shifts = np.zeros((5, 3))
+    shifts[:, 0] = np.array([0, 0.03, 0.02, -0.04, 0.01]) * MM
+    run = RoundedOutput(job, output(job, shifts), np.arange(5))
+    found = run.deviations(run.place(np.array([2, 2, 3, 3])), np.array([0.0, 1.0, 0.0, 1.0]))
+    along = np.array([0.03, 0, 0, -0.04]) * MM * (distance > 0)
+    np.testing.assert_allclose(found.shift, along[:, None] * [1.0, 0, 0], atol=1e-9)
+
+
 LINE = np.array([[-60, 0, 0], [-50, 0, 0], [0, 0, 0], [100, 0, 0]]) * MM
 
 

@@ -300,7 +300,7 @@ class _Findings:
             ("KIN006", block.crossed & done.converged),
         ):
             self.failed.setdefault(code, []).append(tried[failed])
-        if beyond.any() and not len(self.axes):
+        if not len(self.axes):
             self.axes = done.q[beyond][:1]
 
     def judged(self, task: CompensationProblem, why: dict[int, Finding], findings: list[Finding]) -> None:

@@ -178,7 +178,10 @@ class DivisibleMotions:
         number = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
         low, high = self.low[chosen][owner], self.high[chosen][owner]
         at = self.rows[path][owner]
-        first, last = (self._shares(at, low, high, part / count[owner]) for part in (number, number + 1))
+        toolpath = self.task.toolpath
+        first, last = (
+            shares_between(toolpath, at, low, high, part / count[owner]) for part in (number, number + 1)
+        )
         end = self.full.command[at].copy()
         inner = np.flatnonzero(last < 1.0)
         end.put(inner, self.commands(at[inner], last[inner]))
@@ -201,12 +204,6 @@ class DivisibleMotions:
                 values[curved] = getattr(arcs, name)
                 segments = replace(segments, **{name: values})
         return segments, owner
-
-    def _shares(self, rows: Ints, low: Floats, high: Floats, part: Floats) -> Floats:
-        """(K,) the parts ``part`` (K,), 0 to 1, of what lies between the shares ``low`` and ``high`` (K,)."""
-        if self.task.toolpath.orientation_control.any_by_words:
-            return shares_between(self.task.toolpath, rows, low, high, part)
-        return np.where(part == 1.0, high, low + part * (high - low))
 
     def commands(self, rows: Ints, share: Floats, where: str = "between its points") -> Poses:
         """The commands (K) by which the tool is at the shares (K,) of the paths of ``rows`` (K,), under the force

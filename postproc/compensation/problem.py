@@ -323,7 +323,7 @@ class CompensationProblem:
         path = self.toolpath
         return (
             bool(path.constraints.orientation_programmed[rows].all())
-            and not np.isfinite(path.orientation_control.redundant_axis[rows, 0]).any()
+            and not np.isfinite(path.orientation_control.redundant_axis[rows]).any()
         )
 
     def orientation_projection(self, rows: Ints, rotation: Floats) -> Floats | None:

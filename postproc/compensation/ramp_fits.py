@@ -57,39 +57,26 @@ Words = tuple[tuple[str, float], ...]
 """Points: beside the vertex or the end of the ramp, and how many before (less than 0) or after it."""
 
 
-def _both(vertex: range, end: range) -> Words:
-    return (*((_V, float(k)) for k in vertex), *((_E, float(k)) for k in end))
+def _points(before: int, after: int, before_end: int, after_end: int) -> Words:
+    """So many points before and after the vertex, and before and after the end of the ramp, besides both."""
+    sides = ((_V, before, after), (_E, before_end, after_end))
+    return tuple((at, float(k)) for at, low, high in sides for k in range(-low, high + 1))
 
 
 STARTS: tuple[tuple[Words, ...], ...] = (
-    (((_V, 0.0), (_E, 0.0)),),
-    (
-        ((_V, 0.0), (_V, 1.0), (_E, 0.0)),
-        ((_V, -1.0), (_V, 0.0), (_E, 0.0)),
-        ((_V, 0.0), (_E, -1.0), (_E, 0.0)),
-        ((_V, 0.0), (_E, 0.0), (_E, 1.0)),
-    ),
-    (
-        ((_V, -1.0), (_V, 0.0), (_V, 1.0), (_E, 0.0)),
-        ((_V, 0.0), (_V, 1.0), (_E, -1.0), (_E, 0.0)),
-        ((_V, 0.0), (_V, 1.0), (_E, 0.0), (_E, 1.0)),
-    ),
-    (
-        ((_V, -1.0), (_V, 0.0), (_V, 1.0), (_E, 0.0), (_E, 1.0)),
-        ((_V, -1.0), (_V, 0.0), (_V, 1.0), (_E, -1.0), (_E, 0.0)),
-    ),
-    (
-        ((_V, -1.0), (_V, 0.0), (_V, 1.0), (_V, 2.0), (_E, 0.0), (_E, 1.0)),
-        ((_V, -1.0), (_V, 0.0), (_V, 1.0), (_E, -1.0), (_E, 0.0), (_E, 1.0)),
-    ),
+    (_points(0, 0, 0, 0),),
+    (_points(0, 1, 0, 0), _points(1, 0, 0, 0), _points(0, 0, 1, 0), _points(0, 0, 0, 1)),
+    (_points(1, 1, 0, 0), _points(0, 1, 1, 0), _points(0, 1, 0, 1)),
+    (_points(1, 1, 0, 1), _points(1, 1, 1, 0)),
+    (_points(1, 2, 0, 1), _points(1, 1, 1, 1)),
 )
 """Where 1, 2, ... inserted points and that of an approximated vertex may start: beside the vertex, in parts of
 ``BESIDE`` of its approximation, or beside the end of the ramp, in parts of the shortest motion."""
 
 CLOSE_STARTS: tuple[tuple[Words, float], ...] = (
-    (_both(range(-1, 2), range(-1, 2)), 1.02),
-    (_both(range(-1, 3), range(-1, 2)), 1.02),
-    (_both(range(-3, 4), range(-3, 4)), 1.0),
+    (_points(1, 1, 1, 1), 1.02),
+    (_points(1, 2, 1, 1), 1.02),
+    (_points(3, 3, 3, 3), 1.0),
 )
 """Where points start that are fitted closely, as near to each other as the shortest motion lets them, and by which
 factor lines are longer than that.  Of the last ones those beside each turn are fitted alone first."""

@@ -149,22 +149,10 @@ def _ramps(
     parts, path, desired_path = task.force.ramps, task.toolpath, task.desired_path
     inserted = np.flatnonzero((division.role == Role.INTERMEDIATE) & (division.share < 1.0))
     if parts is None or not len(inserted) or limits.no_insert:
-        return (
-            FittedRamps(
-                none,
-                none,
-                none,
-                np.empty(0),
-                none > 0,
-                np.empty((0, 2)),
-                np.empty((0, 2)),
-                np.empty((0, 2)),
-                none,
-                np.empty((0, 2), bool),
-            ),
-            none,
-            none,
-        )
+        pair = np.empty((0, 2))
+        never = none > 0
+        ramps = FittedRamps(none, none, none, np.empty(0), never, pair, pair, pair, none, pair > 0)
+        return ramps, none, none
     row, many = np.unique(parts.row, return_counts=True)
     at = np.searchsorted(parts.row, row)
     end = parts.length[at]

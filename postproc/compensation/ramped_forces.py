@@ -98,11 +98,8 @@ def _limit_profiles(task: CompensationProblem) -> CompensationProblem:
     kept = np.arange(len(row))
     while True:
         here = row[kept]
-        inner = np.append(here[1:] == here[:-1], False)
-        gain = np.append(np.diff(ahead[kept]), 0.0) + STEEPEST * length[here] * np.append(
-            np.diff(share[kept]), 0.0
-        )
-        steep = np.flatnonzero(inner & (gain < -SAME))
+        gain = np.diff(ahead[kept]) + STEEPEST * length[here[1:]] * np.diff(share[kept])
+        steep = np.flatnonzero((here[1:] == here[:-1]) & (gain < -SAME))
         # the place after the part, but the end of a motion stays
         out = np.where(share[kept[steep + 1]] < 1.0, steep + 1, steep)
         out = out[share[kept[out]] > 0.0]

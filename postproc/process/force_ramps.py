@@ -60,7 +60,7 @@ class Ramps:
         without = np.append(np.flatnonzero(~carries), n)
         stop = without[np.searchsorted(without, rows)]  # the first motion after the cut
         last = np.searchsorted(distance, distance[rows] + length, side="left")
-        count = np.clip(last, rows + 1, stop) - rows
+        count = np.minimum(last, stop) - rows
         row = np.repeat(rows, count) + (
             np.arange(int(count.sum())) - np.repeat(np.cumsum(count) - count, count)
         )
@@ -115,13 +115,13 @@ class Ramps:
         stays = last != row
 
         step = self.step[some].reshape(-1, 2, 3)
-        side = 1 * before
+        side = before.astype(int)
         own = _ends(turning, first, side) @ np.swapaxes(step, 1, 2)
 
         def at_end(side: Ints) -> Floats:
             """(E', 6) the steps where the motions ``last`` start (``side`` 0) or end (1)."""
             here = np.swapaxes(_ends(turning, last, side), 1, 2) @ own
-            beside = np.clip(last + 2 * side - 1, begin, stop - 1)
+            beside = np.clip(np.where(side, last + 1, last - 1), begin, stop - 1)
             inner = np.flatnonzero(beside != last)
             there = np.swapaxes(_ends(turning, beside[inner], 1 - side[inner]), 1, 2) @ own[inner]
             here[inner] = 0.5 * (here[inner] + there)
@@ -130,9 +130,9 @@ class Ramps:
         far = at_end(1 - side)
         near = np.where(stays[:, None], far, at_end(side))
         steps, ends, on_arc = self.step.copy(), self.end.copy(), self.on_arc.copy()
-        known = np.isfinite((near + far).sum(axis=1))[:, None]
-        steps[some], ends[some] = np.where(known, near, steps[some]), np.where(known, far, ends[some])
-        on_arc[some] = turning.mask[row] & ~stays & known[:, 0]
+        known = np.isfinite(near + far).all(axis=1)
+        steps[some[known]], ends[some[known]] = near[known], far[known]
+        on_arc[some] = turning.mask[row] & ~stays & known
         return replace(self, step=steps, end=ends, on_arc=on_arc, turning=turning)
 
     @staticmethod
@@ -144,13 +144,11 @@ class Ramps:
         (m_(i+1) - m_i) s_i max(0, 1 - s / s_i), with m_(k+1) = 0.
         """
         same = row[1:] == row[:-1]
-        apart = np.where(same, np.diff(share), 1.0)
-        slope = np.where(same[:, None], np.diff(rest, axis=0) / np.maximum(apart, 1e-12)[:, None], 0.0)
+        apart = np.maximum(np.diff(share), 1e-12)  # from one motion to the next none is asked for
+        slope = np.where(same[:, None], np.diff(rest, axis=0) / apart[:, None], 0.0)
         before, after = np.vstack([np.zeros(6), slope]), np.vstack([slope, np.zeros(6)])
-        knot = share > 0
-        row, share = row[knot], share[knot]
         length = share * extent[row]
-        step = share[:, None] * (before - after)[knot]
+        step = share[:, None] * (before - after)
         some = length > 0
         row, length, step = row[some], length[some], step[some]
         never = np.zeros(len(row), bool)
@@ -203,7 +201,7 @@ class Ramps:
             there = np.maximum(1.0 - (start + extent) / length, 0.0)
             rest = here * step + ahead * there * (end - step)
             arc = np.flatnonzero(self.on_arc[part])
-            if self.turning is not None and len(arc):
+            if self.turning is not None:
                 at, back = some[arc], self.before[part[arc], None]
                 begin, stop = np.where(back, end[arc], step[arc]), np.where(back, step[arc], end[arc])
                 rest[arc] = here[arc] * self.turning.along(rows[at], share[at], begin, stop)

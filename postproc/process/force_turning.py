@@ -37,7 +37,7 @@ class Turning:
         at = rows - (1 - side)
         matrices = np.swapaxes(self.base_in_robot[at] @ self.tool_in_base[at], 1, 2)
         chosen = np.flatnonzero(self.feed[rows])
-        if self.frames is not None and len(chosen):
+        if self.frames is not None:
             matrices[chosen] = self.frames.end(rows[chosen], side)
         return matrices
 
@@ -55,11 +55,11 @@ class Turning:
             """(K, 3, 3): the rows of a matrix are the axes of the frame."""
             matrices = np.swapaxes(turning(first_rotation, turn, arc, share), 1, 2)
             chosen = np.flatnonzero(self.feed[rows])
-            if self.frames is not None and len(chosen):
+            if self.frames is not None:
                 matrices[chosen] = self.frames.along(rows[chosen], share[chosen])
             return matrices
 
-        first, here, last = axes(0 * fraction), axes(fraction), axes(0 * fraction + 1)
+        first, here, last = axes(np.zeros_like(fraction)), axes(fraction), axes(np.ones_like(fraction))
         share = fraction[:, None, None]
         inside = (1 - share) * (start.reshape(-1, 2, 3) @ np.swapaxes(first, 1, 2))
         inside += share * (values.reshape(-1, 2, 3) @ np.swapaxes(last, 1, 2))
