@@ -201,7 +201,7 @@ class Ramps:
             there = np.maximum(1.0 - (start + extent) / length, 0.0)
             rest = here * step + ahead * there * (end - step)
             arc = np.flatnonzero(self.on_arc[part])
-            if self.turning is not None:
+            if self.turning is not None and len(arc):
                 at, back = some[arc], self.before[part[arc], None]
                 begin, stop = np.where(back, end[arc], step[arc]), np.where(back, step[arc], end[arc])
                 rest[arc] = here[arc] * self.turning.along(rows[at], share[at], begin, stop)
