@@ -33,9 +33,9 @@ CODES = define(
         "FIL017": Code(
             "error",
             "edited file would be replaced",
-            meaning="The folder has a file of this name with another content, as after your edits.",
+            meaning="The file that is there was edited: a post with your edits, or a plan with your readings.",
             consequence="It stays as it is; nothing is written.",
-            action="Keep it, name another folder, or ask for the new file with --replace.",
+            action="Keep it and name another place, or ask for a new post with --replace.",
             example="`compensate posts robodk -o C:/RoboDK/Posts` after editing the post there.",
         ),
     }
