@@ -8,6 +8,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from postproc.base.findings import Finding, Refusal
+from postproc.measurements import value_columns
 
 _DELIMITERS = ",;\t"
 
@@ -19,6 +20,11 @@ def refuse_filled(path: Path, columns: Collection[str]) -> None:
     message = "the table has readings already, and an empty one would replace it"
     help = "name another file, or move this one away"
     raise Refusal(Finding("FIL017", message, str(path), help=help))
+
+
+def refuse_filled_plan(path: Path) -> None:
+    """Refusal FIL017 where ``path`` is a plan of poses that has readings, of whatever kind."""
+    refuse_filled(path, [name for kind in (True, False) for names in value_columns(kind) for name in names])
 
 
 def _has_values(path: Path, columns: Collection[str]) -> bool:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -30,10 +29,10 @@ from postproc.experiments.observability import measured
 from postproc.experiments.pool import CANDIDATES
 from postproc.experiments.precision import DesignProblem, Designs, designs, predicted
 from postproc.identification.unknowns import Unknown, asked_for
-from postproc.measurements import Readings, measurements_csv, value_columns
+from postproc.measurements import Readings, measurements_csv
 from postproc.model import StiffnessModel
 from postproc.output.atomic_write import write_atomically
-from postproc.output.filled_tables import refuse_filled
+from postproc.output.filled_tables import refuse_filled_plan
 from postproc.report.page import beside
 from postproc.report.planned import Planned, discrimination_words
 from postproc.report.report import exit_code, json_bytes
@@ -97,7 +96,7 @@ def plan(request: PlanRequest, stage: Stage = silent) -> Planned:
         from postproc.report.page_checks import planned_page  # takes its time to load
 
         files[request.page] = planned_page(planned, beside(request.page, links))
-    write_atomically(files, last=request.output, still=lambda: _refuse_filled(request.output))
+    write_atomically(files, last=request.output, still=lambda: refuse_filled_plan(request.output))
     return planned
 
 
@@ -220,12 +219,7 @@ def _spare_inputs(request: PlanRequest) -> None:
     for path in written:
         if place(path) in inputs:
             raise Refusal(Finding("FIL007", "the output would replace an input", str(path)))
-    _refuse_filled(request.output)
-
-
-def _refuse_filled(output: Path) -> None:
-    """Refusal FIL017 where the plan that is there has readings, of whatever kind."""
-    refuse_filled(output, [name for kind in (True, False) for names in value_columns(kind) for name in names])
+    refuse_filled_plan(request.output)
 
 
 def _wanted(request: PlanRequest, unknowns: Sequence[Unknown]) -> tuple[Floats, Bools, str]:
