@@ -120,6 +120,11 @@ def refused(path: Path, message: str, help: str) -> Refusal:
     return Refusal(Finding("FIL004", message, str(path), help=help))
 
 
+def edited_file(path: Path, message: str, help: str) -> Refusal:
+    """The refusal (FIL017) of an output in whose place a file is that somebody edited."""
+    return Refusal(Finding("FIL017", message, str(path), help=help))
+
+
 def _put_in_place(
     files: Mapping[Path, Content],
     last: Path | None,

@@ -7,8 +7,8 @@ import csv
 from collections.abc import Collection
 from pathlib import Path
 
-from postproc.base.findings import Finding, Refusal
 from postproc.measurements import value_columns
+from postproc.output.atomic_write import edited_file
 
 _DELIMITERS = ",;\t"
 
@@ -19,7 +19,7 @@ def refuse_filled(path: Path, columns: Collection[str]) -> None:
         return
     message = "the table has readings already, and an empty one would replace it"
     help = "name another file, or move this one away"
-    raise Refusal(Finding("FIL017", message, str(path), help=help))
+    raise edited_file(path, message, help)
 
 
 def refuse_filled_plan(path: Path) -> None:
