@@ -133,3 +133,17 @@ def test_pieces_of_a_motion_that_turns_the_tool_turn_with_it(turn):
         angle = np.radians(turn * share[:, side])
         axis = np.stack([np.zeros(len(rows)), np.sin(angle), np.cos(angle)], axis=1)
         assert axes_of(rows, np.full(len(rows), float(side))) == pytest.approx(axis, abs=1e-9)
+
+
+@pytest.mark.parametrize("compliance", [1e-13, 1e-9, 3e-9])
+def test_a_robot_that_hardly_yields_meets_the_nominal_force(compliance):
+    """What it is displaced by is settled at once, whatever the force is taken for; the force is the one that is met."""
+    path = path_through([[-12, 25, -5], [72, 25, -5]])
+    blank = block([0, 0, -20], [60, 50, 0])
+    nominal = np.linalg.norm(run(path, blank, FLAT).largest[:, :3], axis=1).max()
+    found = solve(path, blank, compliance * np.eye(3), FLAT)
+    assert nominal > 100
+    assert found.largest == pytest.approx(nominal, rel=2e-3)
+    assert np.linalg.norm(found.along(np.array([1]), np.array([0.5]))[0, :3]) == pytest.approx(
+        nominal, rel=2e-3
+    )
