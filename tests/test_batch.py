@@ -235,6 +235,28 @@ def test_a_force_beside_the_program_is_watched(parts):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("p1.dat", "DEFDAT p1\nENDDAT\n"),
+        ("p1.force.csv", "line,fx,fy,fz\n10,0,200,0\n"),
+        ("cell.yaml", CELL + "max_correction: 9\n"),
+    ],
+)
+def test_what_comes_during_a_run_is_done_with_by_the_next(parts, name, text):
+    folder = parts / "deep"
+    folder.mkdir()
+    shutil.move(parts / "p1.src", folder / "p1.src")
+    (job,) = jobs_of([str(folder / "p1.src")], {"force": ""}).jobs
+    item = BatchItem(job, code_digest())
+    assert (
+        run_item(item, lambda stage: (folder / name).write_text(text) if stage == "reporting" else None).state
+        == "done"
+    )
+    assert [run_item(item).state for _ in range(2)] == ["done", "unchanged"]
+
+
+@pytest.mark.slow
 def test_an_output_of_an_earlier_run_is_told(parts):
     run(parts)
     program(parts / "p1.src", 0, WRONG)

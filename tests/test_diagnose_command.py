@@ -221,6 +221,11 @@ def test_what_can_not_be_told_apart_is_planned(compensate, shop, tmp_path, undec
         + 0.1
     )
     assert f"({plan.name})" in done.out
+    # filled in and forgotten, it is not replaced by an empty one
+    plan.write_text(shown)
+    again = compensate(*words_for(shop, "-o", "new.yaml"))
+    assert (again.code, "FIL017" in again.err) == (1, True)
+    assert plan.read_text() == shown
     # without a name for it, it is shown and not written
     alone = compensate(*words_for(shop))
     assert "--next-poses FILE.csv writes" in alone.out

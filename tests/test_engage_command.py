@@ -13,9 +13,11 @@ pytest.importorskip("numba")
 import jsonschema_rs
 from click.testing import CliRunner
 
+from postproc.base.findings import Refusal
 from postproc.cli.main import main
 from postproc.robot.description import find_robot
 from postproc.schemas import schema_of
+from postproc.workflows.engage import EngageRequest, engage
 
 CELL = """
 robot: {robot}
@@ -115,6 +117,22 @@ def test_no_output_replaces_an_input(folder, option, name):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", ["part.ngc", "milling.yaml", "cell.yaml"])
+def test_what_changes_during_the_run_is_told(folder, name):
+    """Before the cut is simulated: what was read is another state than what is there when it is written."""
+
+    def change(stage):
+        if stage == "cutting":
+            (folder / name).write_text((folder / name).read_text() + "\n")
+
+    request = EngageRequest(folder / "part.ngc", stock_out=folder / "left.stock", csv=folder / "part.csv")
+    with pytest.raises(Refusal) as refused:
+        engage(request, change)
+    assert [finding.code for finding in refused.value.findings] == ["FIL010"]
+    assert not (folder / "left.stock").exists()
+    assert not (folder / "part.csv").exists()
+
+
 def test_a_blank_as_a_mesh_is_that_of_the_box(folder):
     whole = json.loads(call(folder, "--json", "-").stdout)
     write_stl(folder / "blank.stl", cuboid([0, 0, -30], [100, 60, 0]))

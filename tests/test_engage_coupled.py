@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from stock_cases import CHIP, FLAT, KNOWN, MM, Poses, block, path_through, run, sweeps_of
 
 from postproc.part.coupled_engagement import Paths, solve_coupled
+from postproc.part.deflected_sweeps import axes_of
 from postproc.process.milling_forces import Engagement, engagement, mean_force
 from postproc.toolpath import Kind
 
@@ -117,3 +118,32 @@ def test_where_the_path_turns_at_once_the_tool_turns_as_it_yields():
     assert (np.diff(turned[:4]) > 0).all()
     assert after[-1] == pytest.approx([-before[1], before[0]], rel=0.02)
     assert not len(found.unsettled)
+
+
+@pytest.mark.parametrize("turn", [0.5, 12.0])
+def test_pieces_of_a_motion_that_turns_the_tool_turn_with_it(turn):
+    """Each goes on where the one before ends, and the spindle is where the motion has it."""
+    ends = np.radians([0.0, turn])
+    axes = np.stack([np.zeros(2), np.sin(ends), np.cos(ends)], axis=1)
+    path = path_through([[-15, 20, -8], [70, 20, -8]], axes=axes)
+    found = solve(path, block([0, 0, -20], [60, 50, 0]), np.zeros((3, 3)), FLAT)
+    rows, share = found.pieces.rows, found.pieces.share
+    assert len(rows) > 10
+    for side in (0, 1):
+        angle = np.radians(turn * share[:, side])
+        axis = np.stack([np.zeros(len(rows)), np.sin(angle), np.cos(angle)], axis=1)
+        assert axes_of(rows, np.full(len(rows), float(side))) == pytest.approx(axis, abs=1e-9)
+
+
+@pytest.mark.parametrize("compliance", [1e-13, 1e-9, 3e-9])
+def test_a_robot_that_hardly_yields_meets_the_nominal_force(compliance):
+    """What it is displaced by is settled at once, whatever the force is taken for; the force is the one that is met."""
+    path = path_through([[-12, 25, -5], [72, 25, -5]])
+    blank = block([0, 0, -20], [60, 50, 0])
+    nominal = np.linalg.norm(run(path, blank, FLAT).largest[:, :3], axis=1).max()
+    found = solve(path, blank, compliance * np.eye(3), FLAT)
+    assert nominal > 100
+    assert found.largest == pytest.approx(nominal, rel=2e-3)
+    assert np.linalg.norm(found.along(np.array([1]), np.array([0.5]))[0, :3]) == pytest.approx(
+        nominal, rel=2e-3
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import random
@@ -14,7 +15,10 @@ from pathlib import Path
 import pytest
 from conftest import CELL, LINES
 
-from postproc.batching.hot_folder import HotFolder
+from postproc.base.findings import Finding
+from postproc.batching import hot_folder
+from postproc.batching.hot_folder import RETRY, HotFolder
+from postproc.batching.item import failed
 
 PROGRAM = ("\r\n".join(LINES) + "\r\n").encode("latin-1")
 
@@ -91,12 +95,112 @@ def test_a_program_that_grows_is_waited_for(hot):
     assert (hot / "done" / "one.src").read_bytes() == named("one")
 
 
+def stamp(path):
+    return path.stat().st_size, path.stat().st_mtime_ns
+
+
+EMPTY = b"DEF one()\r\nEND\r\n"
+
+
+@pytest.mark.parametrize("first", [named("one"), EMPTY], ids=["done", "failed"])
+@pytest.mark.parametrize("late", ["one.src", "one.dat"])
+def test_what_arrives_during_the_run_is_not_moved_away(hot, monkeypatch, first, late):
+    """A later version, or a data list that comes late: the program is compensated again with it."""
+    (hot / "one.src").write_bytes(first)
+    texts = {
+        "one.src": named("one").replace(b"X 100.000", b"X 101.000"),
+        "one.dat": b"DEFDAT one\r\nENDDAT\r\n",
+    }
+    run_item, outcomes = hot_folder.run_item, []
+
+    def overtaken(item):
+        outcome = run_item(item)
+        if not outcomes:
+            (hot / late).write_bytes(texts[late])
+        outcomes.append(outcome)
+        return outcome
+
+    monkeypatch.setattr(hot_folder, "run_item", overtaken)
+    watched = HotFolder(hot, options={"force": ""}, settle=0.0)
+    assert watched.step(now=0.0) == 0
+    assert {path.name for path in hot.iterdir() if path.is_file()} == {"cell.yaml", "one.src", late}
+    assert watched.step(now=1.0) == 1
+    lost = outcomes[1].state == "failed"
+    assert (hot / ("failed" if lost else "done") / late).read_bytes() == texts[late]
+    assert lost == (first == EMPTY and late == "one.dat")
+
+
+def test_a_later_version_is_not_moved_for_the_one_before_a_kill(hot, monkeypatch):
+    (hot / "one.src").write_bytes(named("one"))
+    ended, replace = HotFolder(hot, options={"force": ""}, settle=0.0), os.replace
+
+    def kill(source, target):
+        if Path(source).name == "one.src" and Path(target).parent.name == "done":
+            raise KeyboardInterrupt
+        replace(source, target)
+
+    with monkeypatch.context() as context, ended.exclusive():
+        context.setattr(os, "replace", kill)
+        with pytest.raises(KeyboardInterrupt):
+            ended.step(now=0.0)
+    later = named("one").replace(b"X 100.000", b"X 101.000")
+    (hot / "one.src").write_bytes(later)
+    watched = HotFolder(hot, options={"force": ""}, settle=0.0)
+    with watched.exclusive():
+        assert not (hot / "done" / "one.src").exists()
+        assert watched.step(now=0.0) == 1
+    assert (hot / "done" / "one.src").read_bytes() == later
+    report = json.loads((hot / "compensated" / "one.report.json").read_bytes())
+    assert report["digests"]["one.src"] == hashlib.sha256(later).hexdigest()
+
+
+def test_a_program_that_cannot_be_read_is_named_once_and_tried_again(hot, monkeypatch):
+    (hot / "one.src").write_bytes(named("one"))
+    run_item, runs, postponed = hot_folder.run_item, [], []
+
+    def unreadable(item):
+        runs.append(item)
+        finding = Finding("FIL001", "the file cannot be read: Input/output error", str(hot / "one.src"))
+        return failed(item.job, finding) if len(runs) < 3 else run_item(item)
+
+    monkeypatch.setattr(hot_folder, "run_item", unreadable)
+    watched = HotFolder(hot, options={"force": ""}, settle=0.0)
+    times = (0.0, 1.0, RETRY + 1, RETRY + 2, 2 * RETRY + 2)
+    assert [watched.step(now=now, postpone=postponed.append) for now in times] == [0, 0, 0, 0, 1]
+    assert len(runs) == 3
+    assert [outcome.findings[0].code for outcome in postponed] == ["FIL001"]
+
+
+def test_a_cell_that_changes_during_the_run_makes_no_program_wait(hot, monkeypatch):
+    (hot / "one.src").write_bytes(named("one"))
+    run_item, runs = hot_folder.run_item, []
+
+    def changing(item):
+        runs.append(item)
+        if len(runs) > 1:
+            return run_item(item)
+        return run_item(item, lambda stage: (hot / "cell.yaml").write_text(f"{CELL}max_correction: 9\n"))
+
+    monkeypatch.setattr(hot_folder, "run_item", changing)
+    watched = HotFolder(hot, options={"force": ""}, settle=0.0)
+    assert [watched.step(now=now) for now in (0.0, 1.0)] == [0, 1]
+
+
+def test_a_file_of_the_cell_that_is_missing_fails_the_program(hot):
+    (hot / "cell.yaml").write_text(CELL + "process: nowhere.yaml\n")
+    (hot / "one.src").write_bytes(
+        b"\r\n".join(line for line in named("one").split(b"\r\n") if b"FORCE" not in line)
+    )
+    assert HotFolder(hot, options={"force": ""}, settle=0.0).step(now=0.0) == 1
+    assert "nowhere.yaml" in (hot / "failed" / "one.report.json").read_text()
+
+
 def test_a_journal_moves_nothing_outside(hot, tmp_path):
     (tmp_path / "secret").write_text("x")
     (hot / ".compensate").mkdir()
     moves = {
-        str(tmp_path / "secret"): str(hot / "done" / "secret"),
-        str(hot / "cell.yaml"): str(tmp_path / "c"),
+        str(tmp_path / "secret"): [str(hot / "done" / "secret"), *stamp(tmp_path / "secret")],
+        str(hot / "cell.yaml"): [str(tmp_path / "c"), *stamp(hot / "cell.yaml")],
     }
     (hot / ".compensate" / "moves.json").write_text(json.dumps(moves))
     with HotFolder(hot).exclusive():

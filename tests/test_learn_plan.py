@@ -76,6 +76,13 @@ def test_the_command_writes_a_file_to_fill(tmp_path):
     given = np.array([row.split(",")[:3] for row in rows[1:]], float)
     chosen = np.array([line.split(",")[:3] for line in lines[7:]], float)
     assert np.abs(chosen[:, None] - given[None]).max(axis=2).min(axis=1).max() < 2e-5
+    assert CliRunner().invoke(main, words).exit_code == 0  # an empty one is replaced
+    filled = "\n".join([*lines[:7], lines[7].replace(",,", ",0.012,"), *lines[8:]]) + "\n"
+    measure.write_text(filled)
+    again = CliRunner().invoke(main, words)
+    assert (again.exit_code, "FIL017" in again.output) == (1, True)
+    assert measure.read_text() == filled
+    measure.write_text("\n".join(lines) + "\n")
     unfilled = CliRunner().invoke(main, ["learn", str(SAMPLE / "part.src"), str(measure)])
     assert unfilled.exit_code == 1
     assert "LRN001" in unfilled.output

@@ -124,7 +124,7 @@ def test_plan_is_filled_in_and_identified(compensate, out):
         "--measured",
         measured,
         "-o",
-        out,
+        out.with_name("next.csv"),
         "--json",
         "-",
     ]
@@ -481,6 +481,20 @@ def test_names_of_two_effects_are_told(compensate, out):
 def test_inputs_are_not_replaced(compensate, job, out):
     done = compensate(*ROBOT, *TWO, *LEVER, "--poses", 5, "--measured", out, "-o", out)
     assert (done.code, "FIL007" in done.err) == (1, True)
+
+
+@pytest.mark.parametrize(
+    "spelling", [str, lambda text: text.replace(",", ";"), lambda text: text.replace("\n", "\r\n")]
+)
+def test_a_plan_with_readings_is_not_replaced(compensate, out, spelling):
+    words = [*ROBOT, *TWO, *LEVER, "--poses", 5, "-o", out]
+    assert compensate(*words).code in (0, 3)
+    assert compensate(*words, "--seed", 2).code in (0, 3)  # an empty one is
+    filled = spelling(out.read_text().replace(",,,", ",0.1,0.2,0.3", 1)).encode()
+    out.write_bytes(filled)
+    done = compensate(*words)
+    assert (done.code, "FIL017" in done.err) == (1, True)
+    assert out.read_bytes() == filled
 
 
 def test_program_without_force_tests_nothing(compensate, job, out):

@@ -145,7 +145,7 @@ def freecad(tmp_path, monkeypatch):
         rows = (tmp_path / "uncompensated" / "out.process.yaml").read_text().splitlines()[1:]
         return [json.loads(row.partition("- ")[2].rpartition("  #")[0]) for row in rows]
 
-    return SimpleNamespace(run=run, known=known, said=said, folder=tmp_path)
+    return SimpleNamespace(run=run, known=known, said=said, folder=tmp_path, post=post)
 
 
 def cuts(rows, *keys):
@@ -210,6 +210,57 @@ def test_what_a_profile_does_not_state_is_stated_in_the_arguments(freecad):
 )
 def test_a_job_that_does_not_state_enough_is_refused(freecad, properties, words):
     assert words in freecad.run(operation("A", ["G0 X0 Y0 Z5", "G1 Z-2 F100", "G1 X50 F900"], **properties))
+
+
+@pytest.mark.parametrize("name", ["ClearingPattern", "CutPattern"])
+def test_patterns_of_other_operations_and_versions_count(freecad, name):
+    """FreeCAD 1.0 has another name for the pattern of a pocket, surfaces have one of their own."""
+    lines = ["G0 X0 Y0 Z5", "G1 Z-2 F100", "G1 X50 F900"]
+    assert "back and forth" in freecad.run(operation("A", lines, OffsetPattern=None, **{name: "ZigZag"}))
+    assert len(freecad.run(operation("A", lines, OffsetPattern=None, **{name: "Offset"}))) == 1
+
+
+@pytest.mark.parametrize("argument", ["", "--inch"])
+def test_the_unit_is_that_of_the_posted_program(freecad, argument):
+    lines = ["G20", "G0 X0 Y0 Z5", "G1 Z-0.1 F100", "G1 X50 F900", "G21", "G1 X60", "G1 Z-3", "G1 X0"]
+    rows = freecad.run(operation("A", lines), arguments=f"{freecad.known} {argument}")
+    assert cuts(rows, "axial_depth") == [(2.54,), (0.46,)]
+
+
+def test_holes_of_a_cycle_are_no_cuts(freecad):
+    holes = [
+        "G1 X0 Y0 Z5 F100",
+        "G81 X5 Y5 Z-3 R1 F100",
+        "X15",
+        "X25",
+        "G80",
+        "G0 Z5",
+        "X0",
+        "G1 Z-2",
+        "G1 X50",
+    ]
+    rows = freecad.run(operation("A", holes))
+    assert cuts(rows, "lines", "axial_depth") == [([10, 10], 2.0)]
+
+
+@pytest.mark.parametrize("shape", ["ballend", "bullnose", "v-bit", "drill001"])
+@pytest.mark.parametrize("name", ["ShapeName", "ShapeType"])
+def test_the_force_of_a_tool_that_is_no_end_mill_has_to_be_stated(freecad, name, shape):
+    one = operation("A", SLOPES)
+    setattr(one.ToolController.Tool, name, shape)
+    assert f"its tool is a {shape}" in freecad.run(one)
+    setattr(one.ToolController.Tool, name, "endmill001")
+    assert len(freecad.run(one)) == 3
+
+
+def test_a_cut_of_no_operation_is_refused(freecad):
+    words = freecad.run(operation("Pocket", SLOPES), arguments=f"{freecad.known} --cut 'Pocket1=up,2'")
+    assert "no such operation; it has Pocket" in words
+
+
+def test_a_version_that_states_no_file_is_told(freecad):
+    with pytest.raises(RuntimeError, match=r"0\.20 and 0\.21"):
+        freecad.post.export([operation("A", SLOPES)], "-", freecad.known)
 
 
 def test_a_spindle_that_turns_back_is_refused(freecad):

@@ -26,6 +26,7 @@ CASES = {
     "pocket": {"arguments": KNOWN},
     "rounded": {"arguments": f"{KNOWN} --precision 2 --gain 0.5"},
     "inch": {"arguments": f"{KNOWN} --inches"},
+    "short": {"arguments": f"{KNOWN} --inch"},
     "stated": {"arguments": f"{KNOWN} --force=0,100,200@base", "pattern": "ZigZag"},
     "zigzag": {"arguments": KNOWN, "pattern": "ZigZag"},
     "no_material": {"arguments": f"--compensate '{COMMAND}' --helix 30"},
@@ -110,10 +111,12 @@ def test_arguments_are_passed_on(posted):
     assert report["gain"] == 0.5
 
 
-def test_inches_are_inches(posted):
-    folder, _ = posted["inch"]
-    assert "G20" in (folder / "uncompensated" / "inch.ngc").read_text()
-    depths = [row["axial_depth"] for row in processes(folder, "inch")]
+@pytest.mark.parametrize("name", ["inch", "short"])
+def test_inches_are_inches(posted, name):
+    """Also where the argument is abbreviated, as ``linuxcnc_post`` understands it."""
+    folder, _ = posted[name]
+    assert "G20" in (folder / "uncompensated" / f"{name}.ngc").read_text()
+    depths = [row["axial_depth"] for row in processes(folder, name)]
     assert depths == pytest.approx([2.5, 2.5, 2.5, 1.5], abs=0.01)
 
 

@@ -107,4 +107,6 @@ def _package() -> Path:
 def _others() -> tuple[str, ...]:
     """Starts of the paths of files that are no input."""
     folders = {sys.prefix, sys.base_prefix, str(_package()), "/proc", "/sys", "/dev"}
+    if sys.pycache_prefix is not None:
+        folders.add(sys.pycache_prefix)
     return tuple(os.path.join(folder, "") for folder in sorted(folders))

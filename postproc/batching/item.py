@@ -13,7 +13,7 @@ from postproc.base.system import refusal_of_the_system
 from postproc.batching.files_read import code_digest, readings
 from postproc.batching.job_file import Job
 from postproc.batching.locking import locked
-from postproc.batching.records import Record, load_record, lock_path, save_record, sweep
+from postproc.batching.records import Record, files_around, load_record, lock_path, save_record, sweep
 from postproc.report.batched import DONE, FAILED, UNCHANGED, Outcome
 from postproc.report.report import failure
 
@@ -76,9 +76,10 @@ def _run_once(task: BatchItem, report_stage: ReportStage, start_time: float) -> 
     sweep(job, () if before is None else before.outputs)
     if before is not None and not task.rerun and before.holds(job):
         return _outcome(job, UNCHANGED, before.result, start_time)
+    around = files_around(job)
     with readings() as inputs:
         result = _compensated(job, report_stage)
-    record = Record.of(job, inputs, result)
+    record = Record.of(job, around, inputs, result)
     if record is not None:
         save_record(job, record)
     return _outcome(job, DONE, result, start_time)

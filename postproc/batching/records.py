@@ -39,14 +39,17 @@ class Record:
     result: dict[str, object]
 
     @staticmethod
-    def of(job: Job, inputs: dict[str, str], result: dict[str, object]) -> Record | None:
-        """The record of a run that has just ended; None where an input is no longer what was read."""
+    def of(job: Job, around: list[str], inputs: dict[str, str], result: dict[str, object]) -> Record | None:
+        """The record of a run that has just ended; None where an input is no longer what was read.
+
+        around: ``files_around`` before the run, which has not seen what came later.
+        """
         outputs = [str(path) for path in result["outputs"]]  # type: ignore[attr-defined]
         inputs = {path: digest for path, digest in inputs.items() if path not in outputs}
         digests = {path: digest_of(path) for path in outputs}
         if ABSENT in digests.values() or not _still(inputs):
             return None
-        return Record(code_digest(), _options(job), _around(job), inputs, digests, result)
+        return Record(code_digest(), _options(job), around, inputs, digests, result)
 
     @property
     def sound(self) -> bool:
@@ -60,7 +63,7 @@ class Record:
     def holds(self, job: Job) -> bool:
         """Whether doing the job again would give what is there."""
         return (
-            (self.code, self.options, self.around) == (code_digest(), _options(job), _around(job))
+            (self.code, self.options, self.around) == (code_digest(), _options(job), files_around(job))
             and _still(self.inputs)
             and _still(self.outputs)
         )
@@ -69,6 +72,20 @@ class Record:
 def lock_path(target: Path) -> Path:
     """The lock of an output, or of a summary."""
     return target.parent / STATE / f"{target.name}.lock"
+
+
+def files_around(job: Job) -> list[str]:
+    """Files beside the program that carry its stem, and the cell that it would find."""
+    program = job.request.program
+    stem = f"{program.stem}.".casefold()
+    try:
+        names = [entry.name for entry in os.scandir(program.parent) if entry.name.casefold().startswith(stem)]
+    except OSError:
+        names = []
+    if job.request.cell is None:
+        with contextlib.suppress(Refusal):
+            names.append(str(find_cell(program)))
+    return sorted(names)
 
 
 def load_record(job: Job) -> Record | None:
@@ -101,17 +118,3 @@ def _still(digests: dict[str, str]) -> bool:
 
 def _options(job: Job) -> dict[str, str]:
     return {name: repr(str(v) if isinstance(v, Path) else v) for name, v in asdict(job.request).items()}
-
-
-def _around(job: Job) -> list[str]:
-    """Files beside the program that carry its stem, and the cell that it would find."""
-    program = job.request.program
-    stem = f"{program.stem}.".casefold()
-    try:
-        names = [entry.name for entry in os.scandir(program.parent) if entry.name.casefold().startswith(stem)]
-    except OSError:
-        names = []
-    if job.request.cell is None:
-        with contextlib.suppress(Refusal):
-            names.append(str(find_cell(program)))
-    return sorted(names)

@@ -43,9 +43,8 @@ def posts(system: str | None, output: Path | None, replace: bool) -> None:
       compensate posts freecad -o ~/.local/share/FreeCAD/Macro
       compensate posts robodk -o C:/RoboDK/Posts
     """
-    from postproc.base.findings import Finding, Refusal
     from postproc.cli.common import Out
-    from postproc.output.atomic_write import write_atomically
+    from postproc.output.atomic_write import edited_file, write_atomically
     from postproc.posts import post_file
 
     if replace and output is None:
@@ -70,6 +69,6 @@ def posts(system: str | None, output: Path | None, replace: bool) -> None:
                 "the folder has a file of this name that differs from the post: your edits would be lost"
             )
             help = "keep it, name another folder, or use --replace and repeat the edits"
-            raise Refusal(Finding("FIL017", message, str(target), help=help))
+            raise edited_file(target, message, help)
         write_atomically({target: content})
         click.echo(f"wrote {target}")

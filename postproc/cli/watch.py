@@ -112,6 +112,9 @@ def watch(
         elif not out.quiet:
             click.echo(f"{time.strftime('%H:%M:%S')} {_line(outcome)}")
 
+    def postpone(outcome: Outcome) -> None:
+        click.echo(f"{time.strftime('%H:%M:%S')} {_line(outcome)}; it stays, and is tried again", err=True)
+
     hot = HotFolder(folder.absolute(), None if output is None else output.absolute(), options, settle)
     with (
         out.refusals(),
@@ -121,7 +124,7 @@ def watch(
         if not out.quiet:
             click.echo(f"watching {folder}; results go to {hot.results}", err=True)
         while True:
-            moved = hot.step(listen)
+            moved = hot.step(listen, postpone=postpone)
             if once and not moved and not hot.waiting():
                 break
             if not moved:

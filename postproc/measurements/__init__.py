@@ -13,6 +13,7 @@ The file is in mm, deg, N, N m, s and degC.  ``read_measurements`` reads it, ``m
 
 from postproc.measurements import codes as codes
 from postproc.measurements.copied_rows import not_fitted
+from postproc.measurements.header import value_columns
 from postproc.measurements.header_comments import robot_named
 from postproc.measurements.joining import joined
 from postproc.measurements.read_csv import read_measurements
@@ -27,4 +28,5 @@ __all__ = [
     "planned",
     "read_measurements",
     "robot_named",
+    "value_columns",
 ]

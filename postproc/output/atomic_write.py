@@ -33,9 +33,9 @@ CODES = define(
         "FIL017": Code(
             "error",
             "edited file would be replaced",
-            meaning="The folder has a file of this name with another content, as after your edits.",
+            meaning="The file that is there was edited: a post with your edits, or a plan with your readings.",
             consequence="It stays as it is; nothing is written.",
-            action="Keep it, name another folder, or ask for the new file with --replace.",
+            action="Keep it and name another place, or ask for a new post with --replace.",
             example="`compensate posts robodk -o C:/RoboDK/Posts` after editing the post there.",
         ),
     }
@@ -118,6 +118,11 @@ def sweep(files: Iterable[Path]) -> None:
 def refused(path: Path, message: str, help: str) -> Refusal:
     """The refusal (FIL004) of an output that cannot be written."""
     return Refusal(Finding("FIL004", message, str(path), help=help))
+
+
+def edited_file(path: Path, message: str, help: str) -> Refusal:
+    """The refusal (FIL017) of an output in whose place a file is that somebody edited."""
+    return Refusal(Finding("FIL017", message, str(path), help=help))
 
 
 def _put_in_place(

@@ -152,7 +152,7 @@ def solve_coupled(
 ) -> CoupledEngagement | str:
     """The engagement of ``paths`` with tools that ``displaced`` says, or why it is not known."""
     task = displaced.task
-    rows, owner, part = _pieces(run, paths, displaced.division)
+    rows, owner, part = _pieces(run, paths, displaced.division, lever)
     if len(rows) > MOST_PIECES:
         return f"the program has {len(rows)} places to solve, at most {MOST_PIECES} are"
     pieces = PlacedPieces.of(paths, rows, owner, part)
@@ -189,7 +189,9 @@ def solve_coupled(
     return CoupledEngagement(key, wrench, area, float(solved.residual.max()), swept, unsettled)
 
 
-def _pieces(run: StockRun, paths: Paths, division: Subdivision | None) -> tuple[Floats, Ints, Floats]:
+def _pieces(
+    run: StockRun, paths: Paths, division: Subdivision | None, lever: float
+) -> tuple[Floats, Ints, Floats]:
     """Rows (P, ROW) of the pieces of sweeps, whose they are (P,), and their parts (P, 2)."""
     length = run.sweeps.length[paths.number]
     radius = np.array([cutter.radius for cutter in run.sweeps.cutters])[paths.which]
@@ -220,7 +222,7 @@ def _pieces(run: StockRun, paths: Paths, division: Subdivision | None) -> tuple[
     first = np.flatnonzero(owner[1:] == owner[:-1])
     owner, part = owner[first], np.stack([part[first], part[first + 1]], axis=1)
     none = np.zeros((len(owner), 6))
-    rows = displaced_rows(paths.rows[owner], part, none, none, 0.0)
+    rows = displaced_rows(paths.rows[owner], part, none, none, lever)
     same = ~rows[:, TURN : TURN + 3].any(axis=1) | (paths.rows[owner, ANGLE] > 0)
     rows[same, MODE] = paths.rows[owner[same], MODE]
     return rows, owner, part

@@ -21,6 +21,7 @@ from postproc.identification.sanity_checks import check_fit, check_numbers
 from postproc.identification.validation import held_out, validated
 from postproc.measurements import Readings, measurements_csv
 from postproc.output.atomic_write import write_atomically
+from postproc.output.filled_tables import refuse_filled_plan
 from postproc.report.diagnosed import HANGS, Diagnosed, ValidatedFile, diagnosed_csv
 from postproc.report.report import json_bytes
 from postproc.report.residuals import Sizes, lengths_of
@@ -217,6 +218,7 @@ def _published(request: DiagnoseRequest, measured: Measured, result: Diagnosed, 
                     "FIL007", "the output would replace an input", str(plan), help="use --next-poses FILE.csv"
                 )
             )
+        refuse_filled_plan(plan)
         files[plan] = measurements_csv(result.next_poses.readings, _about(result))
         result = replace(result, next_poses_file=str(plan))
     if request.csv is not None:

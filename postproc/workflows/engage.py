@@ -133,5 +133,5 @@ def _engage(request: EngageRequest, inputs: Inputs, stage: Stage) -> Engaged:
     if request.json is not None:
         files[request.json] = json_bytes(engaged)
     inputs.refuse_outputs(files)
-    write_atomically(files)
+    write_atomically(files, still=inputs.refuse_changed)
     return engaged

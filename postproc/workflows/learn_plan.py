@@ -17,6 +17,7 @@ from postproc.learning.causes import CausePrediction
 from postproc.learning.measured_part import FREEDOMS, MeasuredPart, read_planned_points
 from postproc.learning.plan_points import plan_points
 from postproc.output.atomic_write import write_atomically
+from postproc.output.filled_tables import refuse_filled
 from postproc.workflows.learn import LearnRequest, known_before
 from postproc.workflows.learn_points import match, read_job
 from postproc.workflows.preparation import Stage, silent
@@ -43,6 +44,8 @@ class LearnPlan:
 def plan(request: LearnRequest, count: int, stage: Stage = silent) -> LearnPlan:
     """Chooses ``count`` of the points of the one file of ``request``, and writes them.  Raises Refusal."""
     source = request.measured[0]
+    path = request.csv or source.with_name(f"{request.main.program.stem}.measure.csv")
+    refuse_filled(path, ["DEV"])
     stage("reading")
     if len(request.measured) > 1:
         message = "--plan chooses from the points of one file"
@@ -67,9 +70,9 @@ def plan(request: LearnRequest, count: int, stage: Stage = silent) -> LearnPlan:
     prediction = CausePrediction(matched.points, job.ready.model, matched.causes)
     chosen = plan_points(prediction, matched.layout, count)
     rows = matched.line[chosen.chosen] - 2
-    path = request.csv or source.with_name(f"{program.stem}.measure.csv")
     job.ready.inputs.refuse_outputs([path], [source])
-    write_atomically({path: _file(point[rows], normal[rows], [feature[i] for i in rows.tolist()])})
+    table = _file(point[rows], normal[rows], [feature[i] for i in rows.tolist()])
+    write_atomically({path: table}, still=lambda: refuse_filled(path, ["DEV"]))
     return LearnPlan(len(rows), size, chosen.before / MM, chosen.after / MM, path)
 
 

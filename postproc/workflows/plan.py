@@ -32,6 +32,7 @@ from postproc.identification.unknowns import Unknown, asked_for
 from postproc.measurements import Readings, measurements_csv
 from postproc.model import StiffnessModel
 from postproc.output.atomic_write import write_atomically
+from postproc.output.filled_tables import refuse_filled_plan
 from postproc.report.page import beside
 from postproc.report.planned import Planned, discrimination_words
 from postproc.report.report import exit_code, json_bytes
@@ -95,7 +96,7 @@ def plan(request: PlanRequest, stage: Stage = silent) -> Planned:
         from postproc.report.page_checks import planned_page  # takes its time to load
 
         files[request.page] = planned_page(planned, beside(request.page, links))
-    write_atomically(files, last=request.output)
+    write_atomically(files, last=request.output, still=lambda: refuse_filled_plan(request.output))
     return planned
 
 
@@ -218,6 +219,7 @@ def _spare_inputs(request: PlanRequest) -> None:
     for path in written:
         if place(path) in inputs:
             raise Refusal(Finding("FIL007", "the output would replace an input", str(path)))
+    refuse_filled_plan(request.output)
 
 
 def _wanted(request: PlanRequest, unknowns: Sequence[Unknown]) -> tuple[Floats, Bools, str]:

@@ -3,8 +3,9 @@
 ``compensate posts freecad -o FOLDER`` puts this file into FreeCAD's macro folder; then ``compensate`` is one of a job's
 post-processors.  The posted program goes to ``uncompensated/`` beside the output, with a process file of what its
 operations cut, and the command ``compensate`` writes the output.  Where anything fails the output does not exist.  It
-runs in FreeCAD's Python (0.20 and later) and needs nothing but the command; ``cell.yaml`` is looked for beside the
-output and above.  ``--inches``, ``--precision`` and other arguments are passed on to ``linuxcnc_post``.
+runs in FreeCAD's Python (0.20 and 0.21; later ones do not state the output file to a post) and needs nothing but the
+command; ``cell.yaml`` is looked for beside the output and above.  ``--inches``, ``--precision`` and other arguments are
+passed on to ``linuxcnc_post``.
 """
 
 from __future__ import annotations
@@ -37,6 +38,14 @@ FOLDER = "uncompensated"
 DIRECTIONS = {"Climb": "down", "Conventional": "up"}
 ONE_WAY = ("Offset",)
 """Patterns whose passes all have the material on the side that ``CutMode`` states; the others go back and forth."""
+PATTERNS = ("OffsetPattern", "ClearingPattern", "CutPattern")
+"""Properties that state the pattern, by kind of operation and version of FreeCAD."""
+FLAT_TOOLS = ("endmill",)
+"""Shapes of tools that cut as the process file says: with their whole diameter at every depth."""
+UNIT_CODES = {"20": 25.4, "21": 1.0}
+"""G code -> mm."""
+MOTION_CODES = ("0", "1", "2", "3", "33.1", "38.2", "73", "74", *map(str, range(80, 90)))
+"""G codes of which one is in force: motions, and cycles, whose coordinates are those of a hole."""
 SAME = 1e-6
 """[mm] Heights nearer than this are one."""
 _WORD = re.compile(r"([A-Z])\s*([-+]?[0-9.]+)")
@@ -89,14 +98,17 @@ def export(objectslist: list[Any], filename: str, argstring: str) -> str:
     target = Path(filename).absolute()
     try:
         if filename == "-":
-            raise ValueError("the output needs a file name: set the output file of the job")
+            raise ValueError(
+                "the output needs a file name: set the output file of the job (FreeCAD 0.20 and 0.21);"
+                " later versions state none: post with linuxcnc_post into a folder that compensate watch looks at"
+            )
         target.unlink(missing_ok=True)
         options, others = parser.parse_known_args(shlex.split(argstring or ""))
         posted = target.parent / FOLDER / target.name
         lines = _post(objectslist, posted, others).split("\n")
         force = options.force
         if force is None:
-            cuts = list(_process_rows(objectslist, lines, options, 25.4 if "--inches" in others else 1.0))
+            cuts = list(_process_rows(objectslist, lines, options))
             force = str(_write_process(cuts, posted))
         return _compensate(posted, target, force, options)
     except Exception as error:
@@ -144,11 +156,18 @@ def _compensate(posted: Path, target: Path, force: str, options: Any) -> str:
     return target.read_bytes().decode("utf-8", "replace")
 
 
-def _process_rows(objectslist: list[Any], lines: list[str], options: Any, unit: float) -> Iterator[str]:
+def _process_rows(objectslist: list[Any], lines: list[str], options: Any) -> Iterator[str]:
     """The operations of the process file.  Raises ValueError where the job does not state what one cuts."""
     stated = dict(_stated_cut(words) for words in options.cut)
-    for label, obj, first, last in _operations(objectslist, lines):
-        cuts = list(_levels(lines, first, last, obj, unit))
+    operations = list(_operations(objectslist, lines))
+    labels = [label for label, *_ in operations]
+    for label in stated:
+        if label not in labels:
+            raise ValueError(
+                f"--cut {label!r}: the program has no such operation; it has {', '.join(labels)}"
+            )
+    for label, obj, first, last in operations:
+        cuts = list(_levels(lines, first, last, obj))
         if not cuts:
             FreeCAD.Console.PrintWarning(
                 f"compensate: {label} cuts nothing at one height: it is not corrected\n"
@@ -191,12 +210,12 @@ def _operations(objectslist: list[Any], lines: list[str]) -> Iterator[tuple[str,
             yield obj.Label, obj, ends[0], ends[1]
 
 
-def _levels(lines: list[str], first: int, last: int, obj: Any, unit: float) -> Iterator[Cut]:
+def _levels(lines: list[str], first: int, last: int, obj: Any) -> Iterator[Cut]:
     """Stretches of straight and circular cuts at one height.  Each takes what is between it and the height before,
     ``StartDepth`` first, and at most ``StepDown``; a motion above ``StartDepth`` or to another height is no cut."""
     top, step = _length(obj, "StartDepth"), _length(obj, "StepDown")
     height, depth, stretch = top, 0.0, None  # of the last cut, and its lines
-    for index, start, end in _feed_motions(lines[: last + 1], unit):
+    for index, start, end in _feed_motions(lines[: last + 1]):
         if index < first or start[:2] == end[:2]:
             continue
         flat = abs(end[2] - start[2]) < SAME and (top is None or end[2] < top - SAME)
@@ -219,15 +238,14 @@ def _levels(lines: list[str], first: int, last: int, obj: Any, unit: float) -> I
         yield Cut(stretch[0] + 1, stretch[1] + 1, depth)
 
 
-def _feed_motions(
-    lines: list[str], unit: float
-) -> Iterator[tuple[int, tuple[float, ...], tuple[float, ...]]]:
+def _feed_motions(lines: list[str]) -> Iterator[tuple[int, tuple[float, ...], tuple[float, ...]]]:
     """Index, start and end [mm] of every G1, G2 and G3; NaN where a coordinate was never programmed."""
-    place, motion = {"X": math.nan, "Y": math.nan, "Z": math.nan}, ""
+    place, motion, unit = {"X": math.nan, "Y": math.nan, "Z": math.nan}, "", 1.0
     for index, line in enumerate(lines):
         words = _WORD.findall(re.sub(r"\(.*?\)", "", line))
         codes = [value.lstrip("0") or "0" for letter, value in words if letter == "G"]
-        motion = next((code for code in codes if code in ("0", "1", "2", "3")), motion)
+        unit = next((UNIT_CODES[code] for code in codes if code in UNIT_CODES), unit)
+        motion = next((code for code in codes if code in MOTION_CODES), motion)
         start = tuple(place.values())
         place.update((letter, float(value) * unit) for letter, value in words if letter in place)
         moved = any(letter in "XYZIJ" for letter, _ in words)
@@ -239,6 +257,11 @@ def _edges(label: str, obj: Any, options: Any) -> dict[str, Any]:
     """Keys of the process file that belong to tool and material."""
     control = _property(obj, "ToolController")
     tool = control.Tool
+    shape = str(getattr(tool, "ShapeType", None) or getattr(tool, "ShapeName", None) or FLAT_TOOLS[0])
+    if shape.lower().rstrip("0123456789") not in FLAT_TOOLS:  # FreeCAD numbers what it has open already
+        raise ValueError(
+            f"the force of {label} is known for flat end mills, and its tool is a {shape}: state --force"
+        )
     teeth = options.teeth or int(getattr(tool, "Flutes", 0) or 0)
     speed = float(control.SpindleSpeed)
     missing = [
@@ -267,7 +290,7 @@ def _edges(label: str, obj: Any, options: Any) -> dict[str, Any]:
 
 def _direction_and_width(label: str, obj: Any, diameter: float) -> tuple[str, float | None]:
     share, mode = _property(obj, "StepOver"), _property(obj, "CutMode")
-    pattern = _property(obj, "OffsetPattern")
+    pattern = next((value for name in PATTERNS if (value := _property(obj, name)) is not None), None)
     help = f'state it in the arguments, --cut "{label}=down,{0.4 * diameter:g}" (down, up or slot; mm), or --force'
     if pattern is not None and pattern not in ONE_WAY:
         raise ValueError(

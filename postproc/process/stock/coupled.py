@@ -247,6 +247,10 @@ def _solve(tool: ToolAtNode, nodes: Nodes, before: int, k: int, lever: float) ->
             nodes.wrench[k, :] = w
             nodes.residual[k], nodes.area[k] = size, area
         if size <= limit:
+            if (
+                step == 0
+            ):  # where hardly anything yields, the wrench before may be far from the one that is met
+                nodes.wrench[k, :] = g
             return
         if step == 0:
             g_before[:], r_before[:] = g, r
