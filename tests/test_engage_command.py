@@ -102,6 +102,17 @@ def test_the_next_program_finds_what_the_first_left(folder):
     refused(folder, "STK008", "no motion cuts")
 
 
+def test_drill_cycles_are_named_as_what_is_not_simulated(folder):
+    """Alone they are refused; beside other motions they are a warning."""
+    holes = "G0 X20 Y30 Z5\nG81 X20 Y30 Z-10 R2 F300\nX40\nG80\nG0 Z30\n"
+    (folder / "part.ngc").write_text(f"G21 G90 G17 G54\nT1 M6\n{holes}M2\n")
+    refused(folder, "STK007", "drill cycles are not simulated")
+    (folder / "part.ngc").write_text(SLOT.replace("M2", f"{holes}M2"))
+    findings = json.loads(call(folder, "--json", "-", code=3).stdout)["findings"]
+    (found,) = [one for one in findings if one["code"] == "STK013"]
+    assert found["message"].startswith("2 motions") and "it is a drill cycle" in found["message"]
+
+
 @pytest.mark.parametrize(
     ("option", "name"), [("--stock-out", "one.stock"), ("--csv", "milling.yaml"), ("--json", "part.ngc")]
 )

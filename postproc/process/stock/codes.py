@@ -57,7 +57,7 @@ CODES = define(
         "STK007": Code(
             "error",
             "no motion can be simulated",
-            meaning="No motion has a known start, end, base and spindle axis.",
+            meaning="No motion has a known start, end, base and spindle axis; drill cycles are not simulated.",
             consequence="Nothing is known of what the program cuts.",
             action="Complete the cell: bases, tools with their axis, orientation.",
             example="A three-axis program in a cell without `orientation:`.",
@@ -105,7 +105,8 @@ CODES = define(
         "STK013": Code(
             "warning",
             "motions are not simulated",
-            meaning="Start, end, tool or spindle axis of these motions is not known, or their tool changes.",
+            meaning="Start, end, tool or spindle axis of these motions is not known, or their tool changes; drill "
+            "cycles are not simulated.",
             consequence="What they cut is missing, and later motions may find stock that is gone.",
             action="Complete the cell, or write the approach as a Cartesian motion.",
             example="`LIN P1` after `PTP HOME`.",

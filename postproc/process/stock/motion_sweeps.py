@@ -85,7 +85,12 @@ def find_sweeps(
     simulated = known & shifted(known) & moves & toolpath.continues
     simulated[1:] &= numbers[1:] == numbers[:-1]
     if not simulated.any():
-        raise Refusal(Finding("STK007", "no motion has a known start, end and spindle axis", program))
+        message = "no motion has a known start, end and spindle axis"
+        if toolpath.drills.any():
+            message = (
+                "drill cycles are not simulated, and no other motion has a known start, end and spindle axis"
+            )
+        raise Refusal(Finding("STK007", message, program))
     _refuse_turned_part(toolpath, simulated & on_path, program)
     cutters, which = _cutters(toolpath, numbers, simulated & on_path, process, program)
     simulated &= which >= 0

@@ -293,7 +293,7 @@ def _not_simulated(sweeps: MotionSweeps, toolpath: Toolpath, program: str) -> li
         return []
     message = (
         f"{len(lost)} motions are not simulated, or not exactly: start, end, tool or spindle axis is not known, "
-        "the tool only turns, or a spline is taken as a straight line"
+        "the tool only turns, it is a drill cycle, or a spline is taken as a straight line"
     )
     return [Finding("STK013", message, program, int(toolpath.line[lost[0]]))]
 
