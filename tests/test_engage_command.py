@@ -110,7 +110,8 @@ def test_drill_cycles_are_named_as_what_is_not_simulated(folder):
     (folder / "part.ngc").write_text(SLOT.replace("M2", f"{holes}M2"))
     findings = json.loads(call(folder, "--json", "-", code=3).stdout)["findings"]
     (found,) = [one for one in findings if one["code"] == "STK013"]
-    assert found["message"].startswith("2 motions") and "it is a drill cycle" in found["message"]
+    assert found["message"].startswith("2 motions")
+    assert "it is a drill cycle" in found["message"]
 
 
 @pytest.mark.parametrize(
