@@ -5,15 +5,18 @@ from __future__ import annotations
 import csv
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from postproc.base.findings import Refusal
 from postproc.base.units import DEG, MM
 from postproc.experiments import pool, precision
 from postproc.identification.campaign import Campaign
 from postproc.measurements import measurements_csv, read_measurements
 from postproc.model import StiffnessModel
+from postproc.output.filled_tables import refuse_filled_plan
 from postproc.report.planned import discrimination_words
 from postproc.robot.description import find_robot, load_robot
 from postproc.workflows import plan as workflow
@@ -508,3 +511,17 @@ def test_help_names_the_contract(compensate):
     assert done.code == 0
     for option in ("--effects", "--poses", "--discriminate", "--loads", "-o"):
         assert option in done.out
+
+
+def test_a_table_that_cannot_be_read_is_not_replaced(tmp_path, monkeypatch):
+    """It may have readings."""
+    there = tmp_path / "plan.csv"
+    there.write_text("pose\n")
+
+    def read_bytes(path):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "read_bytes", read_bytes)
+    with pytest.raises(Refusal, match="cannot be read, so it is not replaced: Permission denied"):
+        refuse_filled_plan(there)
+    refuse_filled_plan(tmp_path / "none.csv")

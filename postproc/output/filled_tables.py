@@ -7,6 +7,7 @@ import csv
 from collections.abc import Collection
 from pathlib import Path
 
+from postproc.base.findings import Finding, Refusal
 from postproc.measurements import value_columns
 from postproc.output.atomic_write import edited_file
 
@@ -28,9 +29,13 @@ def refuse_filled_plan(path: Path) -> None:
 
 
 def _has_values(path: Path, columns: Collection[str]) -> bool:
-    text = ""
-    with contextlib.suppress(OSError, ValueError):
+    if not path.is_file():
+        return False
+    try:  # not as an input: it is replaced
         text = path.read_bytes().decode("utf-8-sig", "replace")
+    except OSError as error:
+        what = f"what is there cannot be read, so it is not replaced: {error.strerror}"
+        raise Refusal(Finding("FIL001", what, str(path))) from None
     lines = [line for line in text.splitlines() if line.strip() and not line.lstrip(' "').startswith("#")]
     if not lines:
         return False

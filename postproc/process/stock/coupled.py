@@ -247,9 +247,8 @@ def _solve(tool: ToolAtNode, nodes: Nodes, before: int, k: int, lever: float) ->
             nodes.wrench[k, :] = w
             nodes.residual[k], nodes.area[k] = size, area
         if size <= limit:
-            if (
-                step == 0
-            ):  # where hardly anything yields, the wrench before may be far from the one that is met
+            # where hardly anything yields, the wrench before may be far from the one that is met
+            if step == 0:
                 nodes.wrench[k, :] = g
             return
         if step == 0:
