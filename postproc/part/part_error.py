@@ -40,6 +40,7 @@ from postproc.toolpath import Toolpath
 _FLOOR, _WALL = np.cos(10 * DEG), np.sin(10 * DEG)
 _SURE = 1.05  # of the largest displacement that was seen
 _LEAST_REACH = 0.01 * MM
+_GOUGE = 1e-7  # m: in what the program does not make, less is none
 _BESIDE = 5 * MM
 _LONGEST = 0.2  # m: edges whose length is not stated
 
@@ -47,9 +48,9 @@ _LONGEST = 0.2  # m: edges whose length is not stated
 class _Nominal(NamedTuple):
     """What is known of a program before its tools are displaced.
 
-    Its surface and the points of it that are ``own`` (K,), with the motion (K,) that made them and the feature (K,)
-    that they belong to; its sweeps ``paths`` that may reach the part; the sweeps of earlier programs; lever [m]: how
-    far an edge is from the tip at most.
+    The surface that is meant; its points that are ``own`` (K,), which the program makes or gouges, with the motion (K,)
+    that does and the feature (K,) that they belong to; its sweeps ``paths`` that may reach the part; the sweeps of
+    earlier programs; lever [m]: how far an edge is from the tip at most.
     """
 
     run: StockRun
@@ -81,8 +82,6 @@ def find_part_error(
     known, and why.
     """
     nominal = _nominal(run, count)
-    if not len(nominal.own):
-        return Finding("PRT001", "the program leaves no surface of its own on the part", task.file)
     path = task.toolpath
     paths = nominal.paths
     cutting = np.unique(paths.motion[run.engagement.cuts[paths.motion]])
@@ -113,6 +112,9 @@ def find_part_error(
         lost = unknown.args[0]
         message = f"the displacement of the tool is not known in {len(lost)} motions that reach the part"
         return Finding("PRT001", message, task.file, int(path.line[lost[0]]))
+    nominal, sides = _of_program(nominal, sides)
+    if not len(nominal.own):
+        return Finding("PRT001", "the program leaves no surface of its own on the part", task.file)
     area = nominal.surface.area[nominal.own]
     whole = [_figures(nominal, side, path, task.tolerance) for side in sides]
     figures = PartFigures(
@@ -155,17 +157,35 @@ def _nominal(run: StockRun, count: int) -> _Nominal:
     earlier = run.engagement.stock.sweeps[: 0 if run.before is None else len(run.before.rows)]
     own = np.flatnonzero(surface.sweep >= len(earlier))
     sweep = surface.sweep[own] - len(earlier)
-    slope = np.abs(np.einsum("ki,ki->k", surface.normals[own], run.sweeps.rows[sweep, AXIS : AXIS + 3]))
-    return _Nominal(
-        run,
-        surface,
-        own,
-        run.sweeps.motion[sweep],
-        np.where(slope >= _FLOOR, 0, np.where(slope <= _WALL, 1, 2)),
-        paths_of(run),
-        earlier,
-        lever_of(run),
+    made_by, feature = run.sweeps.motion[sweep], _features(run, surface.normals[own], sweep)
+    return _Nominal(run, surface, own, made_by, feature, paths_of(run), earlier, lever_of(run))
+
+
+def _features(run: StockRun, normals: Floats, sweep: Ints) -> Ints:
+    """(K,) numbers in ``FEATURES`` of points with the ``normals`` (K, 3) where the cutter of ``sweep`` (K,) is."""
+    slope = np.abs(np.einsum("ki,ki->k", normals, run.sweeps.rows[sweep, AXIS : AXIS + 3]))
+    return np.where(slope >= _FLOOR, 0, np.where(slope <= _WALL, 1, 2))
+
+
+def _of_program(nominal: _Nominal, sides: Sequence[PartSide]) -> tuple[_Nominal, list[PartSide]]:
+    """The sides, of all points of the surface, at those that the program makes, and at those of the blank and of
+    earlier programs that its displaced tools gouge."""
+    surface, sweeps = nominal.surface, nominal.run.sweeps
+    worst = np.argmin([side.error for side in sides], axis=0)
+    error, motion = (
+        np.choose(worst, [getattr(side, name) for side in sides]) for name in ("error", "motion")
     )
+    gouged = np.flatnonzero((surface.sweep < len(nominal.earlier)) & (error < 0.0))
+    sweep = np.searchsorted(sweeps.motion, motion[gouged])
+    own = np.concatenate([nominal.own, gouged])
+    nominal = nominal._replace(
+        own=own,
+        made_by=np.concatenate([nominal.made_by, motion[gouged]]),
+        feature=np.concatenate([nominal.feature, _features(nominal.run, surface.normals[gouged], sweep)]),
+    )
+    return nominal, [
+        PartSide(side.error[own], side.motion[own], side.share[own], side.arm[own]) for side in sides
+    ]
 
 
 def lever_of(run: StockRun) -> float:
@@ -196,7 +216,8 @@ def _near(run: StockRun) -> Bools:
 
 
 def _side(nominal: _Nominal, displacement: Displacement, paths: Paths) -> PartSide:
-    """The errors with displaced tools along ``paths``.  Raises _UnknownDisplacement."""
+    """The errors with displaced tools along ``paths``, at all points of the surface: at those that the program does not
+    make they are 0 but where it gouges.  Raises _UnknownDisplacement."""
     largest, lost = 0.0, np.zeros(0, np.int64)
 
     def moved(motion: Ints, share: Floats) -> tuple[Floats, Floats]:
@@ -211,20 +232,23 @@ def _side(nominal: _Nominal, displacement: Displacement, paths: Paths) -> PartSi
     rows, owner, share = deflect(paths.rows, paths.motion, paths.share, nominal.lever, moved)
     if len(lost):
         raise _UnknownDisplacement(lost)
-    surface, own = nominal.surface, nominal.own
+    surface = nominal.surface
     found = find_errors(
         nominal.run.engagement.stock,
         np.concatenate([nominal.earlier, rows]),
         max(_SURE * largest, _LEAST_REACH),
-        surface.points[own],
-        surface.normals[own],
+        surface.points,
+        surface.normals,
     )
     sweep = found.sweep - len(nominal.earlier)
     at = np.maximum(sweep, 0)
     motion = np.where(sweep >= 0, paths.motion[owner[at]], -1)
     place = share[at, 0] + found.share * (share[at, 1] - share[at, 0])
-    arm = surface.points[own] - tips_of(rows[at], np.nan_to_num(found.share))
-    return PartSide(found.error, motion, place, arm)
+    arm = surface.points - tips_of(rows[at], np.nan_to_num(found.share))
+    # beside an edge what is nearest is a wall of the program, not a gouge in the face beside it
+    gouged = found.along_normal & (found.error < -_GOUGE) & (sweep >= 0)
+    made = surface.sweep >= len(nominal.earlier)
+    return PartSide(np.where(made | gouged, found.error, 0.0), motion, place, arm)
 
 
 def _figures(nominal: _Nominal, side: PartSide, path: Toolpath, tolerance: float) -> SideFigures:

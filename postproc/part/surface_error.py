@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.base.arrays import Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import each_block
 from postproc.part.surface import outward
 from postproc.process.stock.borrowed import borrowed
@@ -32,11 +32,12 @@ _GOLDEN = 0.6180339887498949
 @dataclass(frozen=True, eq=False)
 class SurfaceError:
     """Of K points: error (K,) [m]; sweep (K,): which one left the surface there, -1 for the blank's own; share (K,):
-    where along it, NaN for none."""
+    where along it, NaN for none; along_normal (K,): the normal meets that surface, which is not only the nearest."""
 
     error: Floats
     sweep: Ints
     share: Floats
+    along_normal: Bools
 
 
 def find_errors(nominal: Stock, rows: Floats, reach: float, points: Floats, normals: Floats) -> SurfaceError:
@@ -44,19 +45,28 @@ def find_errors(nominal: Stock, rows: Floats, reach: float, points: Floats, norm
     of ``nominal``; reach [m]: the largest displacement."""
     stock, _ = build_stock(nominal.blank, np.ascontiguousarray(rows), nominal.cutters, reach)
     error, share = np.empty(len(points)), np.empty(len(points))
-    sweep = np.empty(len(points), np.int64)
+    sweep, along_normal = np.empty(len(points), np.int64), np.empty(len(points), np.bool_)
 
     def look(part: slice) -> None:
-        _errors(stock, points[part], normals[part], error[part], sweep[part], share[part])
+        _errors(stock, points[part], normals[part], error[part], sweep[part], share[part], along_normal[part])
 
     each_block(look, len(points), 1024)
-    return SurfaceError(error, sweep, share)
+    return SurfaceError(error, sweep, share, along_normal)
 
 
 @compiled
-def _errors(stock: Stock, points: Floats, normals: Floats, error: Floats, sweep: Ints, share: Floats) -> None:
+def _errors(
+    stock: Stock,
+    points: Floats,
+    normals: Floats,
+    error: Floats,
+    sweep: Ints,
+    share: Floats,
+    along_normal: Bools,
+) -> None:
     stock, points, normals = lent_stock(stock), borrowed(points), borrowed(normals)
     error, sweep, share = borrowed(error), borrowed(sweep), borrowed(share)
+    along_normal = borrowed(along_normal)
     time, reach = len(stock.sweeps), stock.grid[1]
     at, there = np.zeros(3), np.zeros(3)
     for i in range(len(points)):
@@ -64,20 +74,20 @@ def _errors(stock: Stock, points: Floats, normals: Floats, error: Floats, sweep:
         nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
         f, owner = nearest_sweep(stock, x, y, z, time, reach)
         nearest, first = f, owner
-        s = 0.0
+        s, meets = 0.0, True
         for _ in range(60):
             if abs(f) < _EXACT or abs(s) > reach:
                 break
             s += f  # never beyond the surface: the distance changes by at most the step
             f, owner = nearest_sweep(stock, x + s * nx, y + s * ny, z + s * nz, time, reach)
         if abs(s) > reach or abs(f) >= _EXACT:
-            s, owner = nearest, first
+            s, owner, meets = nearest, first, False
         elif abs(s) > _STEEP * abs(nearest) + _EXACT:
             at[0], at[1], at[2] = x + s * nx, y + s * ny, z + s * nz
             smooth = outward(stock, at, there)
             if not smooth or there[0] * nx + there[1] * ny + there[2] * nz < 1.0 / _STEEP:
-                s, owner = nearest, first
-        error[i], sweep[i] = s, owner
+                s, owner, meets = nearest, first, False
+        error[i], sweep[i], along_normal[i] = s, owner, meets
         share[i] = np.nan if owner < 0 else nearest_share(stock, owner, x + s * nx, y + s * ny, z + s * nz)
 
 
