@@ -9,6 +9,7 @@ from test_engage_command import CELL
 
 import postproc.part.part_error
 from postproc.api import compensate
+from postproc.part.part_figures import ErrorFigures
 from postproc.robot.description import find_robot
 from postproc.workflows.engage import EngageRequest, engage
 
@@ -56,3 +57,8 @@ def test_a_floor_that_was_there_is_gouged_as_deep_as_the_one_beside_it(tmp_path,
     # the tool of the second program is all that is displaced: elsewhere the floor is as it was
     assert points[floor, 1].min() > 19.9
     assert np.abs(part.after.error[old]).max() < 0.01e-3
+
+
+def test_figures_of_a_part_without_error_have_no_minus():
+    figures = ErrorFigures.of(np.zeros(3), np.ones(3), 1e-5)
+    assert [f"{value:.1f}" for value in (figures.gouge_max, figures.excess_max)] == ["0.0", "0.0"]

@@ -34,8 +34,8 @@ class ErrorFigures:
         order = np.argsort(size)
         at = int(np.searchsorted(np.cumsum(area[order]), 0.95 * total))
         return ErrorFigures(
-            float(max(-error.min(), 0.0)),
-            float(max(error.max(), 0.0)),
+            max(0.0, float(-error.min())),
+            max(0.0, float(error.max())),
             float(np.sqrt(np.sum(area * error**2) / total)),
             float(size[order[min(at, len(size) - 1)]]),
             float(area[size > tolerance].sum() / total),
