@@ -412,12 +412,13 @@ FORCE_CODES = define(
         ),
         "FRC047": Code(
             "warning",
-            "motions of unknown time between cuts",
+            "unknown time between cuts",
             meaning="A log over t_s counts the time at the programmed feed; rapid motions, rotations on the spot and "
-            "moves to axis positions state none.",
+            "moves to axis positions state none, and while the program waits (a dwell, a halt, an input, a change of "
+            "tool) none is counted.",
             consequence="The forces after them are shifted along the path by the time that they took.",
             action="Record the log over s_mm, or state the forces by line.",
-            example="A log over t_s of a program with G0 between two cuts.",
+            example="A log over t_s of a program with G0 or G4 between two cuts.",
         ),
     }
 )

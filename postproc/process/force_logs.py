@@ -141,6 +141,9 @@ def _scale(
         index < (cutting[-1] if len(cutting) else 0)
     )
     findings += _uncounted_findings(column, np.flatnonzero(uncounted), path_length, toolpath, program)
+    if column == "t_s" and len(cutting):
+        waits = np.flatnonzero(toolpath.sequence.waits[cutting[0] : cutting[-1]]) + cutting[0]
+        findings += _wait_findings(waits, toolpath, program)
     end = np.cumsum(extent)
     return Scale(end - extent, end, air, column)
 
@@ -165,6 +168,18 @@ def _uncounted_findings(
     )
     help = "record the log over s_mm, or state the forces by line"
     return [Finding("FRC047", what, program, line, help=help)]
+
+
+def _wait_findings(rows: Ints, toolpath: Toolpath, program: str) -> list[Finding]:
+    """Of motions ``rows`` (K,) between cuts after which the program waits, or may, in a log over t_s."""
+    if not len(rows):
+        return []
+    what = (
+        f"after {len(rows)} motions between cuts the program waits, or may (dwells, halts, inputs, changes of tools),"
+        " and t_s does not count that time: the forces of all cuts after them are shifted by it"
+    )
+    help = "record the log over s_mm, or state the forces by line"
+    return [Finding("FRC047", what, program, int(toolpath.line[rows[0]]), help=help)]
 
 
 def _check_order(table: CsvTable, column: str, place: Floats) -> None:

@@ -28,6 +28,7 @@ class MotionSequence(MotionColumns):
     start of the program, -2 for what the program does not contain.
     ``drills`` (N,): the motion is a drill cycle, and its target the bottom of the hole: the tool comes down to it from
     above and goes back up.  Neither it nor the motion behind it ``continues``, although no other motion is between.
+    ``waits`` (N,): after the motion the program waits, or may: for a time, an input, an operator, a tool.
     """
 
     approximation: Floats = field(default_factory=not_given, metadata=column(default=0.0))
@@ -36,6 +37,7 @@ class MotionSequence(MotionColumns):
     continues: Bools = field(default_factory=not_given, metadata=column(dtype=np.bool_, default=True))
     predecessors: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
     drills: Bools = field(default_factory=not_given, metadata=column(dtype=np.bool_, default=False))
+    waits: Bools = field(default_factory=not_given, metadata=column(dtype=np.bool_, default=False))
 
     def _fill(self, count: int) -> None:
         super()._fill(count)

@@ -126,6 +126,7 @@ _LIMITS = (25.0, 26.0)
 """G of a Sinumerik whose S is a limit."""
 _HALTS = (0.0, 1.0, 60.0)
 """M that stop the program when their block has ended."""
+_TOOL_CHANGE = 6.0
 _FLOW = (2.0, 17.0, 30.0, 97.0, 98.0, 99.0)
 """M that say where the program goes on or ends; what is called is followed."""
 
@@ -137,9 +138,7 @@ def with_stops(blend: Floats, words: BlockWords, rows: Ints) -> Floats:
     codes = words.words(key("M"))
     called = np.isin(codes.value, _FLOW)
     halts = np.isin(codes.value, _HALTS)
-    before_dwell = np.searchsorted(rows, np.flatnonzero(words.modal.has(Once.DWELL)), side="left") - 1
-    before_halt = np.searchsorted(rows, codes.block[halts], side="right") - 1
-    stops = np.concatenate([before_dwell, before_halt])
+    stops = _before_halts(words, rows)
     unclear = np.concatenate([codes.block[~halts & ~called], words.words(key("T")).block])
     maybe = np.concatenate([np.searchsorted(rows, unclear, side=side) - 1 for side in ("left", "right")])
     stops, maybe = stops[stops >= 0], maybe[maybe >= 0]
@@ -150,6 +149,24 @@ def with_stops(blend: Floats, words: BlockWords, rows: Ints) -> Floats:
     result[maybe] = np.nan
     result[stops] = 0.0
     return result
+
+
+def _before_halts(words: BlockWords, rows: Ints) -> Ints:
+    """(K,) motions in blocks ``rows`` (N,) after which a dwell or a halt is, -1 before the first one."""
+    codes = words.words(key("M"))
+    before_dwell = np.searchsorted(rows, np.flatnonzero(words.modal.has(Once.DWELL)), side="left") - 1
+    before_halt = np.searchsorted(rows, codes.block[np.isin(codes.value, _HALTS)], side="right") - 1
+    return np.concatenate([before_dwell, before_halt])
+
+
+def waits_after(words: BlockWords, rows: Ints) -> Bools:
+    """(N,) motions in blocks ``rows`` (N,) after which the program waits, or may: a dwell, a halt, a change of tool."""
+    codes = words.words(key("M"))
+    changes = np.concatenate([codes.block[codes.value == _TOOL_CHANGE], words.words(key("T")).block])
+    before = np.concatenate([_before_halts(words, rows), np.searchsorted(rows, changes, side="left") - 1])
+    waits = np.zeros(len(rows), np.bool_)
+    waits[before[before >= 0]] = True
+    return waits
 
 
 def _uncertain(words: BlockWords) -> Bools:

@@ -54,7 +54,7 @@ from postproc.languages.gcode.drill_cycles import (
 )
 from postproc.languages.gcode.execution import execute
 from postproc.languages.gcode.external_axes import addresses, external_axes, moves_external, others_move
-from postproc.languages.gcode.feeds import Feeds, blend_tolerances, blends, with_stops
+from postproc.languages.gcode.feeds import Feeds, blend_tolerances, blends, waits_after, with_stops
 from postproc.languages.gcode.frame_changes import frame_blocks, frame_change
 from postproc.languages.gcode.integer_words import integer_words
 from postproc.languages.gcode.macro_arguments import without_arguments, without_modal_arguments
@@ -196,6 +196,7 @@ def _read(
             approximation=with_stops(found.take_column("blend"), given, rows),
             continues=~(drilled | np.append(False, drilled[:-1])[: len(rows)]),
             drills=drilled,
+            waits=shared(waits_after(given, rows)),
         ),
         constraints=EditConstraints(
             refused=refused,

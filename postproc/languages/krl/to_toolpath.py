@@ -70,7 +70,8 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
     given = _partial_components(rows, n)
     several = _several(table)
     continues = _read_only(continuous(rows, single))
-    stopped = _stop(table, stopped_motions(rows, continues))
+    waits = stopped_motions(rows, continues)
+    stopped = _stop(table, waits)
     toolpath = Toolpath(
         targets=Targets(
             kind=_read_only(table.kind),
@@ -89,6 +90,7 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
             stops=_stops(rows, table),
             continues=continues,
             predecessors=predecessors(rows, continues),
+            waits=np.isin(np.arange(n), list(waits)) if waits else _sparse((n,), np.bool_(False), {}),
         ),
         constraints=EditConstraints(
             refused=refused,
@@ -147,7 +149,10 @@ def _read_only(array: NDArray[Any]) -> NDArray[Any]:
 
 
 def _sparse(
-    shape: tuple[int, ...], blank: float | np.int32, filled: Mapping[int, Any], unit: float | Floats = 1
+    shape: tuple[int, ...],
+    blank: float | np.int32 | np.bool_,
+    filled: Mapping[int, Any],
+    unit: float | Floats = 1,
 ) -> NDArray[Any]:
     """``blank`` everywhere but in the rows that are filled; without memory of its own where none is."""
     if not filled:

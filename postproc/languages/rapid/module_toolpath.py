@@ -69,7 +69,7 @@ def module_toolpath(
     unknown = sorted(rows.problems)
     refused = {row: _finding(document, rows, row, *rows.problems[row]) for row in unknown}
     facts = rows.facts
-    zone, stops = _zones(rows, continues, flow.waited)
+    zone, stops, waits = _zones(rows, continues, flow.waited)
     toolpath = Toolpath(
         targets=Targets(
             kind=kind,
@@ -92,6 +92,7 @@ def module_toolpath(
                 for row in np.flatnonzero(~continues).tolist()
                 if rows.fact(row).arguments is not None
             },
+            waits=waits,
         ),
         arcs=arcs,
         constraints=EditConstraints(
@@ -135,23 +136,26 @@ def _speeds(rows: ModuleRows, refreshed: set[Source]) -> Floats:
     return speeds
 
 
-def _zones(rows: ModuleRows, continues: Bools, waited: set[Source]) -> tuple[Floats, Bools]:
+def _zones(rows: ModuleRows, continues: Bools, waited: set[Source]) -> tuple[Floats, Bools, Bools]:
     """(N,) [m] by which each motion may leave its path before the target, NaN where not known; (N,) where the robot
-    stops: where the program waits before the next motion too, whatever zone is stated.  waited: offsets of motions
-    after which it waits, and goes on where the file does not say."""
+    stops: where the program waits before the next motion too, whatever zone is stated; (N,) where it waits, or may.
+    waited: offsets of motions after which it waits, and goes on where the file does not say."""
     zone = rows.per_row([fact.zone * MM for fact in rows.facts], float)
     stops = rows.per_row([fact.stops for fact in rows.facts], np.bool_)
+    waits = np.zeros(len(rows), np.bool_)
     seen: set[Meeting] = set()
     for first, _, fact in rows.each():
         if fact.waits == Waits.NO or first >= rows.never_from:
             continue
-        before = [row for row in rows.starts_of(first, seen) if zone[row] != 0.0]
+        before = rows.starts_of(first, seen)
+        waits[before] = True
+        before = [row for row in before if zone[row] != 0.0]
         surely = fact.waits == Waits.YES and bool(continues[first])
         zone[before] = 0.0 if surely else np.nan
         stops[before] |= surely
     for row in rows.rows_of(waited, set()):
-        zone[row] = 0.0 if stops[row] else np.nan
-    return zone, stops
+        zone[row], waits[row] = 0.0 if stops[row] else np.nan, True
+    return zone, stops, waits
 
 
 def _rotations(quaternions: Floats) -> Floats:

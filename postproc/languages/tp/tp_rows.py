@@ -141,6 +141,13 @@ class TpRows:
             blend[before], stops[before] = (0.0 if ends else np.nan), ends
         return blend, stops
 
+    def waiting(self) -> Bools:
+        """(N,) motions after which the program waits, or may."""
+        found, visited = np.zeros(len(self), np.bool_), set[Meeting]()
+        for row in self.waits:
+            found[list(self.starts_of(row, visited))] = True
+        return found
+
     def _cut_short(self) -> list[int]:
         """Rows at whose end the corner may be smaller than stated, as a motion starts or ends in a line."""
         found: set[int] = set()

@@ -77,6 +77,7 @@ def toolpath_of(
                 for row in np.flatnonzero(~continues).tolist()
                 if rows.moves[row] is not None
             },
+            waits=rows.waiting(),
         ),
         arcs=arcs,
         constraints=EditConstraints(
