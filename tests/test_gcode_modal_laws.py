@@ -127,3 +127,15 @@ def test_no_offset_that_turns_with_a_table_changes_nothing(block: str) -> None:
     assert not program.toolpath.constraints.refused
     assert {finding.code for finding in program.findings} == set()
     assert len(read(text.replace("P0", "P2"), "fanuc").toolpath.constraints.refused) >= 1
+
+
+def test_a_mode_of_a_kuka_cnc_is_ended_by_its_own_command_only() -> None:
+    """#MCS are the axes of the machine, #ACS is the place of the clamped part: #ACS OFF does not end #MCS ON."""
+    head = "#TRAFO ON\nG54 G90 G71 T1\nG0 X0 Y0 Z0 A0 B0 C0\nF100\n"
+    for on, off, known in (
+        ("#MCS ON", "#MCS OFF", True), ("#ACS ON", "#ACS OFF", True),
+        ("#MCS ON", "#ACS OFF", False), ("#ACS ON", "#MCS OFF", False),
+    ):  # fmt: skip
+        path = read(f"{head}{on}\nG1 X1\n{off}\nG1 X2 Y2 Z2 A0 B0 C0\nM30\n", "kuka_cnc").toolpath
+        assert 1 in path.constraints.refused
+        assert (2 not in path.constraints.refused) is known, (on, off)

@@ -49,6 +49,7 @@ class Group(IntEnum):
     FEED_AXES = 29  # 0 F is that of X, Y, Z; else of other axes too, or not of all (FGROUP)
     PLACED = 30  # 0; else coordinates are those of a plane that the program states (G68, G68.2 of a Fanuc)
     FACE = 31  # 0; else polar coordinate interpolation (G12.1)
+    FIXTURE = 33  # 0; else coordinates are those of a clamped part whose place the program states (#ACS ON)
     BENT = 32  # 0; else of a mode whose end is not read (G7.1, G54.2, GEOAX): no code of another one ends it
     ORIENTED = 41  # tool vectors are in the coordinates of 0 the part, 1 the machine (ORIMKS)
     EULER = 40  # what A2= B2= C2= are: 0 Euler angles (Z X' Z''), 1 RPY angles (Z Y' X'')

@@ -384,6 +384,7 @@ def no_insert_before(words: BlockWords, rows: Ints, in_other_file: Bools) -> dic
         (in_other_file, "its block is in another file"),
         (more, "its block contains more than the motion"),
         (modal.flow.entered, "a jump leads to its block"),
+        (modal.force[Group.POLAR] != 0, "its words are polar coordinates (G16)"),
         (feeds_before_units(words), "its F is in the unit from before it"),
         (words.noted("feed"), "its FB states the feed of one block"),
     ):

@@ -66,12 +66,14 @@ _NUMBERED: tuple[tuple[Group, int, tuple[float, ...]], ...] = (
 _NAMED: tuple[tuple[Group, int, str], ...] = (
     (Group.TCP, 1, "TRAFO ON"),
     (Group.TCP, 0, "TRAFO OFF"),
-    (Group.FOREIGN, 1, "MCS ON,ACS ON"),
-    (Group.FOREIGN, 0, "MCS OFF,ACS OFF"),
+    (Group.FOREIGN, 1, "MCS ON"),
+    (Group.FOREIGN, 0, "MCS OFF"),
     (Group.AXIAL, 1, "PTP ON"),
     (Group.AXIAL, 0, "PTP OFF"),
     (Group.PATH, 1, "HSC ON"),
     (Group.ONCE, Once.FRAME, "CS,CS ON,CS OFF,CS DEF,CS ADD"),
+    (Group.FIXTURE, 1, "ACS ON"),
+    (Group.FIXTURE, 0, "ACS OFF"),
 )
 
 

@@ -101,7 +101,7 @@ MOST_STATED = 1000
 
 
 def _stated(number: int, values: Floats, stated: dict[tuple[float, ...], StatedOffset]) -> int:
-    """The number of a work offset with ``values`` (6,) X, Y, Z [m] and the angles [rad] about Z, the new Y and the new X,
+    """The number of a work offset with ``values`` (6,) X, Y, Z [m] and angles [rad] about Z, the new Y and the new X;
     -1 where unknown."""
     if np.isnan(values).any() or number < 0:
         return -1
