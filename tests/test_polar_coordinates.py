@@ -54,6 +54,7 @@ def test_targets_are_those_that_complex_numbers_give(seed: int) -> None:
         ("G16\nG1 X10.\n", False),
         ("G16\nG1 X-10. Y90.\n", False),  # what a negative radius is, no manual states
         ("G16\nG91 G1 X10. Y90.\n", False),
+        ("G16 H2\nG1 X10. Y90.\n", False),  # Okuma: another work offset
         ("G16\nG1 X10. Y45.\nG91 Y45.\n", False),
         ("G16\nG1 X10. Y#500\n", False),
         ("G16\n/G1 X10. Y90.\n", False),
@@ -103,3 +104,12 @@ def test_other_controls_have_other_polar_modes() -> None:
     """LinuxCNC has no G16; that of controls after it is about where the tool is."""
     path = read("linuxcnc", "G16\nG1 X10. Y90.\nG15\nG1 X7.\n", HEAD.replace(" M6", "\nM6")).toolpath
     assert np.isnan(path.position[1:, 1]).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "known"), [("G15 G43 H1 Z5.\n", True), ("G15 G17 G49 G80 H1\n", True), ("G15 H1\n", False)]
+)
+def test_a_length_beside_the_end_of_polar_coordinates_is_no_work_offset(text: str, known: bool) -> None:
+    """G15 H is the work offset of an Okuma; beside G43 the H is that of the tool's length."""
+    path = read("fanuc", f"{text}G1 X1. Y1. Z1.\n", HEAD).toolpath
+    assert bool(path.base[-1] >= 0) is known

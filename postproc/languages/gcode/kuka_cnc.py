@@ -67,13 +67,13 @@ _NAMED: tuple[tuple[Group, int, str], ...] = (
     (Group.TCP, 1, "TRAFO ON"),
     (Group.TCP, 0, "TRAFO OFF"),
     (Group.FOREIGN, 1, "MCS ON"),
+    (Group.FIXTURE, 1, "ACS ON"),
     (Group.FOREIGN, 0, "MCS OFF"),
+    (Group.FIXTURE, 0, "ACS OFF"),
     (Group.AXIAL, 1, "PTP ON"),
     (Group.AXIAL, 0, "PTP OFF"),
     (Group.PATH, 1, "HSC ON"),
     (Group.ONCE, Once.FRAME, "CS,CS ON,CS OFF,CS DEF,CS ADD"),
-    (Group.FIXTURE, 1, "ACS ON"),
-    (Group.FIXTURE, 0, "ACS OFF"),
 )
 
 

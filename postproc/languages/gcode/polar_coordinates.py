@@ -23,8 +23,10 @@ _ALONE = (Group.TURNED, Group.SCALED, Group.MIRRORED, Group.PLACED)
 def polar_targets(words: BlockWords) -> PolarTargets:
     """Of a whole program."""
     n, force = len(words), words.modal.force
-    mode = force[Group.POLAR]
-    if not mode.any() or not words.control.increments:
+    mode, codes = force[Group.POLAR], words.words(key("G"))
+    starting = codes.block[codes.value == 16]
+    of_offsets = words.has(key("H"))[starting].any()  # an Okuma, of which G16 H is another work offset
+    if not mode.any() or not words.control.increments or of_offsets:
         return PolarTargets(everywhere([False] * 3, n), everywhere([np.nan] * 3, n), everywhere(False, n))
     before = np.append(words.modal.ahead[Group.POLAR], mode[:-1])
     result = PolarTargets(np.zeros((n, 3), np.bool_), np.full((n, 3), np.nan), (mode >= 0) & (before >= 0))
@@ -38,10 +40,9 @@ def polar_targets(words: BlockWords) -> PolarTargets:
     for group in _ALONE:
         known &= force[group] == 0
     # where another origin, plane or offset holds, or G16 is stated again, both are to be stated again
-    codes = words.words(key("G"))
     starts = words.modal.has(*CHANGES) | (np.diff(plane, prepend=plane[:1]) != 0) | (mode != 1)
     starts |= words.modal.switched(Group.OFFSET) | words.modal.switched(Group.UNITS)
-    starts[codes.block[codes.value == 16]] = True
+    starts[starting] = True
     section = np.maximum.accumulate(np.where(starts, rows, -1))
     moving = words.motion & ~words.machine & (mode == 1)
     held = []
