@@ -409,7 +409,7 @@ def frame_events(
         value = np.where(at_plane[:, None] & single, ends[:, None], value)
         lose(linear, called & ~at_plane, What.CYCLE)
     leave(linear, words.noted("swivel"), What.SWIVEL)
-    lose(whole, words.noted("corner", "axis", "polar"), What.OTHER)
+    lose(whole, words.noted("axis", "polar") | (words.noted("corner") & ~words.motion), What.OTHER)
     leave(whole, flow.forget, What.CALL)
 
     leave(linear, modal.switched(Group.OFFSET) | spoiled, What.BASE)

@@ -379,6 +379,8 @@ def no_insert_before(words: BlockWords, rows: Ints, in_other_file: Bools) -> dic
     more |= words.has(*(key(letter) for letter in "ABC")) & (modal.force[Group.TCP] != 1)
     inverse_time = modal.force[Group.FEED] == Feed.INVERSE_TIME
     found: dict[int, str] = {}
+    after = np.flatnonzero(words.noted("corner")[rows]) + 1
+    found.update(dict.fromkeys(after[after < len(rows)].tolist(), "the control rounds the corner before it"))
     for mask, why in (
         (inverse_time, "F is the time of the whole block (G93)"),
         (in_other_file, "its block is in another file"),
