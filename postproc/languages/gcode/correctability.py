@@ -158,6 +158,7 @@ def check_correctability(
         "tool radius compensation is active: the contour is not the tool's path",
     )
     refuse(force[Group.ROUNDING] != 0, "GCO016", "RNDM is active, so the control rounds every corner")
+    refuse(force[Group.SPLINE] != 0, "GCO016", "a spline leads through the targets or near them")
     refuse(force[Group.AXIAL] != 0, "GCO016", "the axes move to the target independently (PTP)")
     for group, message in FRAMED.items():
         refuse(framed(force[group]), "GCO010", f"the coordinates are {message}")
