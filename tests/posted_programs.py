@@ -110,6 +110,10 @@ def fanuc() -> dict[str, list[str]]:
             *head, *change, *pocket(1), "G51.1 X-50.", *pocket(1), "G51.1 Y0.", *pocket(1), "G50.1 X0. Y0.", *pocket(1),
             *end,
         ],
+        "fanuc-polar.nc": [
+            *head, *change, "G0 X0. Y0.", "Z20.", "G98 G81 G16 X40. Y0. Z-8. R2. F100.",
+            *(f"Y{angle}." for angle in range(45, 360, 45)), "G15 G80", *pocket(1), *end,
+        ],
         "fanuc-rotary-indexed.nc": [
             *head, *change, *pocket(1), "G91 G28 Z0.", "G90 G0 B90.", *change, *pocket(1), "G0 B0.", *pocket(2), *end,
         ],
@@ -179,6 +183,13 @@ def sinumerik() -> dict[str, list[str]]:
         "840d-workpiece.mpf": [
             "WORKPIECE(,,,\"BOX\",112,0,-20,-80,0,0,100,100)", *head, "GROUP_BEGIN(0,\"A\",0,0)", *change, *pocket(),
             "GROUP_END(0,0)", *end,
+        ],
+        "840d-robot.mpf": [
+            "N01 G17 G710 G40", "N02 TRAORI", "N03 G90 G64",
+            "N04 $P_UIFR[1]=CTRANS(X,800.5,Y,-960.25,Z,40.125):CROT(X,0.00000,Y,0.00000,Z,90.00000)", "N05 G54",
+            "N06 $TC_DP3[1,1]=-100.00000", "N07 T1 D1", "N08 ORIWKS", "N09 ORIVIRT1", "F6000",
+            *(f"G1 X{220 + i}.000 Y250.000 Z{350 + i % 3}.000 A={i - 90}.000 B=60.000 C=30.000" for i in range(40)),
+            "M30",
         ],
         "840d-sub.mpf": [
             "%_N_MAIN_MPF", *head, *change, "G0 X0 Y0", "Z2", "L10 P3", *pocket(1), "M30",

@@ -127,3 +127,37 @@ def test_no_offset_that_turns_with_a_table_changes_nothing(block: str) -> None:
     assert not program.toolpath.constraints.refused
     assert {finding.code for finding in program.findings} == set()
     assert len(read(text.replace("P0", "P2"), "fanuc").toolpath.constraints.refused) >= 1
+
+
+def test_a_mode_of_a_kuka_cnc_is_ended_by_its_own_command_only() -> None:
+    """#MCS are the axes of the machine, #ACS is the place of the clamped part: #ACS OFF does not end #MCS ON."""
+    head = "#TRAFO ON\nG54 G90 G71 T1\nG0 X0 Y0 Z0 A0 B0 C0\nF100\n"
+    for on, off, known in (
+        ("#MCS ON", "#MCS OFF", True), ("#ACS ON", "#ACS OFF", True),
+        ("#MCS ON", "#ACS OFF", False), ("#ACS ON", "#MCS OFF", False),
+    ):  # fmt: skip
+        path = read(f"{head}{on}\nG1 X1\n{off}\nG1 X2 Y2 Z2 A0 B0 C0\nM30\n", "kuka_cnc").toolpath
+        assert 1 in path.constraints.refused
+        assert (2 not in path.constraints.refused) is known, (on, off)
+
+
+@pytest.mark.parametrize(
+    ("name", "corner"),
+    [("sinumerik", "RND=2"), ("sinumerik", "CHF=1.5"), ("fanuc", ",R2."), ("fanuc", ", C2.")],
+)
+def test_the_corner_that_the_control_rounds_is_where_the_next_motion_is_stated_from(
+    name: str, corner: str
+) -> None:
+    """Its block and the path at it are the control's; what is programmed after it has known ends."""
+    text = f"G21 G90 G17 G54 T1\nG0 X0. Y0. Z3.\nF600\nG1 X10. {corner}\nY20.\nG91 X5.\nM30\n"
+    path = read(text if name == "fanuc" else text.replace("G21", "G71"), name).toolpath
+    np.testing.assert_allclose(path.position[1:] * 1e3, [[10, 0, 3], [10, 20, 3], [15, 20, 3]])
+    assert sorted(path.constraints.refused) == [1]
+    # a short motion beside the corner would change how it is rounded
+    assert "corner" in path.constraints.no_insert_before[2]
+    assert 3 not in path.constraints.no_insert_before
+
+
+def test_an_angle_that_states_the_end_leaves_it_unknown() -> None:
+    path = read("G21 G90 G17 G54 T1\nG0 X0. Y0. Z3.\nF600\nG1 X10. ,A45.\nX20.\nM30\n", "fanuc").toolpath
+    assert np.isnan(path.position[1:]).all()

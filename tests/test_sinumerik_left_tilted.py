@@ -93,7 +93,7 @@ def test_a_return_to_elsewhere_is_no_plain_one() -> None:
 
 
 @pytest.mark.parametrize(
-    "written", ["$P_UIFR[1]=CTRANS(X,10)", "$P_UIFR[1,X,TR]=10", "$P_UIFR[R5]=CTRANS(X,10)"]
+    "written", ["$P_UIFR[1]=CTRANS(X,R5)", "$P_UIFR[1,X,TR]=10", "$P_UIFR[R5]=CTRANS(X,10)"]
 )
 def test_a_work_offset_that_the_program_writes_is_not_that_of_the_cell(written: str) -> None:
     for before in ("", "G1 X9\n"):

@@ -16,7 +16,7 @@ from postproc.languages.gcode.execution_flow import FlowReason
 from postproc.languages.gcode.integer_words import IntegerWords
 from postproc.languages.gcode.modal import Modal
 from postproc.languages.gcode.modal_fill import everywhere, lookup
-from postproc.languages.gcode.positions import AxisWords
+from postproc.languages.gcode.positions import AxisWords, PolarTargets
 from postproc.languages.gcode.source import Source, WordColumn
 from postproc.languages.gcode.words import COLUMNS, How, key
 
@@ -36,6 +36,7 @@ FRAMED = {
     Group.DIAMETER: "diameters (G7)",
     Group.LENGTHS: "an offset that the program computes",
     Group.FOREIGN: "those of an unknown mode",
+    Group.FIXTURE: "those of a part's own system (#ACS ON)",
     Group.FACE: "those of polar interpolation (G12.1)",
     Group.BENT: "those of a mode that is not read (G7.1, G54.2, GEOAX)",
     Group.CARRIER: "those of a tool whose offsets the control turns (TCARR)",
@@ -320,13 +321,14 @@ def frame_events(
     ends: Floats,
     lengths: Bools,
     references: Floats,
+    polar: PolarTargets,
     reasons: Reasons,
 ) -> AxisWords:
     """What the blocks do to the coordinates; why they leave them unknown is put into ``reasons``.
 
     spoiled (B,): blocks before which the base became another one; away (B,): see ``tilted``; ends (B,) [m]: as of
     ``CycleEnds``; lengths (B,): blocks in which another tool length holds than before; references (B, 6) [rad]: as of
-    ``reference_angles``.
+    ``reference_angles``; polar: of these blocks.
     """
     modal, n = words.modal, len(words)
     force, flow = modal.force, modal.flow
@@ -350,8 +352,13 @@ def frame_events(
 
     whole = np.ones(6, np.bool_)
     move, cycle = words.move, words.motion & (words.move == Move.CYCLE)
+    if polar.target.any():
+        target[:, :3] |= polar.target
+        value[:, :3] = np.where(polar.target, polar.place, value[:, :3])
+        relative = relative & ~np.pad(polar.target, ((0, 0), (0, 3)))
     unread = target & np.isnan(value)
     lose(unread, np.any(unread, axis=1), What.WORD)
+    lose(unread, np.any(unread[:, :3] & polar.target, axis=1), What.FRAME)
     lose(whole, words.axis & words.ambiguous, What.INTEGER)
     ambiguous = target & (force[Group.DISTANCE] < 0)[:, None]
     lose(ambiguous, np.any(ambiguous, axis=1), What.MODE)
@@ -402,7 +409,7 @@ def frame_events(
         value = np.where(at_plane[:, None] & single, ends[:, None], value)
         lose(linear, called & ~at_plane, What.CYCLE)
     leave(linear, words.noted("swivel"), What.SWIVEL)
-    lose(whole, words.noted("corner", "axis", "polar"), What.OTHER)
+    lose(whole, words.noted("axis", "polar") | (words.noted("corner") & ~words.motion), What.OTHER)
     leave(whole, flow.forget, What.CALL)
 
     leave(linear, modal.switched(Group.OFFSET) | spoiled, What.BASE)
@@ -415,8 +422,9 @@ def frame_events(
     mirrored &= force[Group.MIRRORED] == READ
     for group in FRAMED:
         if force[group].any() or modal.ahead[group]:
-            lose(whole, framed(force[group]) & words.motion, What.FRAME)
-            leave(whole, modal.switched(group) & ~mirrored, What.FRAME)
+            known = polar.read if group == Group.POLAR else np.zeros(n, np.bool_)
+            lose(whole, framed(force[group]) & words.motion & ~known, What.FRAME)
+            leave(whole, modal.switched(group) & ~mirrored & ~known, What.FRAME)
     leave(present, mirrored, What.FRAME)
     if force[Group.PLACED].any() or modal.ahead[Group.PLACED]:
         by_plane = modal.has(Once.FRAME) & words.control.iso & ~mirrored

@@ -49,6 +49,8 @@ class Group(IntEnum):
     FEED_AXES = 29  # 0 F is that of X, Y, Z; else of other axes too, or not of all (FGROUP)
     PLACED = 30  # 0; else coordinates are those of a plane that the program states (G68, G68.2 of a Fanuc)
     FACE = 31  # 0; else polar coordinate interpolation (G12.1)
+    SPLINE = 34  # 0; else a spline leads through the targets, or near them (G151, #SPLINE ON)
+    FIXTURE = 33  # 0; else coordinates are those of a clamped part whose place the program states (#ACS ON)
     BENT = 32  # 0; else of a mode whose end is not read (G7.1, G54.2, GEOAX): no code of another one ends it
     ORIENTED = 41  # tool vectors are in the coordinates of 0 the part, 1 the machine (ORIMKS)
     EULER = 40  # what A2= B2= C2= are: 0 Euler angles (Z X' Z''), 1 RPY angles (Z Y' X'')
@@ -268,7 +270,8 @@ class Control:
     saves_modes: M70 to M73 save and restore what is in force; keeps_length: M6 with the tool that is loaded already
     changes no coordinate; longest_line: bytes of a line with its end that the control reads, None where its manuals
     state none; increments_by_setting: whether an increment after a change of the frame starts at the place of the tool
-    or at its coordinates from before it, is a setting.
+    or at its coordinates from before it, is a setting; layered_offsets: a work offset is one of the coordinate system
+    in which it is selected, as ``frame`` follows.
     """
 
     name: str
@@ -305,3 +308,4 @@ class Control:
     saves_modes: bool = False
     longest_line: int | None = None
     increments_by_setting: bool = False
+    layered_offsets: bool = False

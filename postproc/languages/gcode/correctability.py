@@ -158,6 +158,7 @@ def check_correctability(
         "tool radius compensation is active: the contour is not the tool's path",
     )
     refuse(force[Group.ROUNDING] != 0, "GCO016", "RNDM is active, so the control rounds every corner")
+    refuse(force[Group.SPLINE] != 0, "GCO016", "a spline leads through the targets or near them")
     refuse(force[Group.AXIAL] != 0, "GCO016", "the axes move to the target independently (PTP)")
     for group, message in FRAMED.items():
         refuse(framed(force[group]), "GCO010", f"the coordinates are {message}")
@@ -379,11 +380,14 @@ def no_insert_before(words: BlockWords, rows: Ints, in_other_file: Bools) -> dic
     more |= words.has(*(key(letter) for letter in "ABC")) & (modal.force[Group.TCP] != 1)
     inverse_time = modal.force[Group.FEED] == Feed.INVERSE_TIME
     found: dict[int, str] = {}
+    after = np.flatnonzero(words.noted("corner")[rows]) + 1
+    found.update(dict.fromkeys(after[after < len(rows)].tolist(), "the control rounds the corner before it"))
     for mask, why in (
         (inverse_time, "F is the time of the whole block (G93)"),
         (in_other_file, "its block is in another file"),
         (more, "its block contains more than the motion"),
         (modal.flow.entered, "a jump leads to its block"),
+        (modal.force[Group.POLAR] != 0, "its words are polar coordinates (G16)"),
         (feeds_before_units(words), "its F is in the unit from before it"),
         (words.noted("feed"), "its FB states the feed of one block"),
     ):

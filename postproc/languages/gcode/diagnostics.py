@@ -100,7 +100,8 @@ def diagnostics(
     add(
         words.noted("base"),
         "GCO024",
-        "the program writes a work offset: where it is then is not known, whatever the cell states of its number",
+        "the program writes a work offset: it is where the program states it, whatever the cell states of its number,"
+        " and not known without numbers or before the program selects it again",
     )
     data = words.noted("tool data")
     data[[block for block, _ in written_lengths(words)]] = True

@@ -13,6 +13,7 @@ from postproc.base.units import MM
 from postproc.languages.gcode.blocks import AXES, SMALL_ANGLE, BlockWords
 from postproc.languages.gcode.control import READ, Event, Group, Once, ProgrammedFrame, either_frame
 from postproc.languages.gcode.lexing import FARTHEST
+from postproc.languages.gcode.modal import decode_g_codes
 from postproc.languages.gcode.words import How, Note, key
 
 _ANGLES = tuple(key(letter) for letter in "IJKR")
@@ -33,6 +34,9 @@ def _changes(words: BlockWords) -> Bools:
     mentioned = words.has(*(key(letter) for letter in "XYZABC"))
     always = words.modal.has(Once.UNSHIFT, Once.SUSPEND, Once.RESTORE, Once.FRAME)
     placed = (words.modal.force[Group.PLACED] != 0) | (words.modal.force[Group.MIRRORED] == READ)
+    if words.control.layered_offsets and always.any():
+        codes = words.words(key("G"))
+        always[codes.block[decode_g_codes(codes.value, words.control)[2] == Group.OFFSET]] = True
     if placed.any():
         always |= words.modal.switched(Group.PLACED) | (words.modal.switched(Group.OFFSET) & placed)
     return (always | (words.modal.has(Once.SHIFT, Once.LOCAL) & mentioned)) & words.modal.flow.tape

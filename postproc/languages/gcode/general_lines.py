@@ -127,7 +127,10 @@ def line(text: bytes) -> LexedLine:
             note("assign", text[found.start() : end].strip())
             place = end
         elif kind == "corner":
-            note("corner", text[found.start() :].strip())
+            corner = (
+                found["corner"][1:].strip()[:1].upper() in b"CR"
+            )  # else an angle (,A) that states the end
+            note("corner" if corner else "polar", text[found.start() :].strip())
         elif kind == "name":
             word = found["name"].upper()
             if word.startswith(HARMLESS) or _speaks(words):

@@ -78,6 +78,8 @@ class _KukaCncLine(LineWords):
     def command(self, place: int, command: re.Match[bytes]) -> None:
         text, names = self.text, self.names
         name, second = command[1].upper(), command[2].upper()
+        if name == b"SET" and second == b"SPLINE":  # as it was written before
+            name, second = second, text[command.end() :].strip().upper()
         said = name + b" " + second if second else name
         for number in names.get(said, names.get(name, ())):
             self.word(place, key("G"), -1, len(text.rstrip()), number, How.INTEGER)

@@ -63,6 +63,8 @@ CALLING_M = (96, 97, 98, 99, 198)
 """M codes that have a P."""
 _FIXTURES = (542, 544)
 """G54.2 P, G54.4 P of a Fanuc: offsets that turn with a table, or for a part that is not straight; with P0 none."""
+_LENGTHS = (430, 434, 435, 440, 490, 2340)
+"""Codes of tool lengths, of which the H of their block is."""
 _FARTHEST_OFFSET = 1e6
 """No control numbers its offsets so far."""
 
@@ -303,8 +305,11 @@ def _offsets(
         values = np.where(none, np.int32(0), values)
     selecting = (number == 150) & (groups == Group.POLAR)
     if selecting.any():
-        # An Okuma: G15 H selects the offset, and G54 to G59 with an H are lengths of tools.
-        selecting &= source.mask(key("H"))[blocks]
+        # An Okuma: G15 H selects the offset, and G54 to G59 with an H are lengths of tools; beside G43 of a Fanuc the H
+        # is that of the length.
+        lengths = np.zeros(len(source.blocks), np.bool_)
+        lengths[blocks[np.isin(number, _LENGTHS)]] = True
+        selecting &= source.mask(key("H"))[blocks] & ~lengths[blocks]
         if selecting.any():
             groups = np.where(selecting, np.int8(Group.OFFSET), groups)
             values = np.where(groups == Group.OFFSET, np.int32(UNKNOWN), values)

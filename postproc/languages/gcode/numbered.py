@@ -9,12 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
-from postproc.base.geometry import Poses, rotation_from_abc
+from postproc.base.geometry import Poses
 from postproc.base.units import DEG
 from postproc.languages.gcode.blocks import AXES, BlockWords
 from postproc.languages.gcode.control import Group, Once
 from postproc.languages.gcode.execution_flow import FlowReason
 from postproc.languages.gcode.modal_fill import everywhere, fill_modal, switched
+from postproc.languages.gcode.settable_frames import written_frames
 from postproc.languages.gcode.words import key
 from postproc.toolpath import FrameRef
 
@@ -35,7 +36,6 @@ _BASE_FRAME = re.compile(
     r"\$(?:P_(?:(?!PFRAME)[A-Z0-9]*FRAME|(?!UIFR)[A-Z0-9]*FR)|AA_(?:OFF|ETRANS|DRF))(?![A-Z])", re.I
 )
 """Variables of a Sinumerik that move all work offsets; $P_UIFR is one of these, $P_PFRAME the programmed frame."""
-_WRITTEN_BASE = re.compile(r"\$P_UIFR(?:[ \t]*+\[[ \t]*+(\d{1,4}+)[ \t]*+[\],])?+", re.I)
 _WRITTEN_TOOL = re.compile(
     r"(?!\$TC_(?:DP(?:1|6|7|8|9|10|11|15|16|17|18|19|20|24|25)|DPCE|DPH|TP\d*|MOP\w*+)[ \t]*+\[)"
     r"\$TC_\w++(?:[ \t]*+\[[ \t]*+(\d{1,9}+)[ \t]*+[\],])?+", re.I
@@ -50,7 +50,7 @@ STATED = 1 << 28
 
 @dataclass(frozen=True, eq=False)
 class StatedOffset:
-    """A work offset as G10 L2 sets it: its number, which one it is, and where it is in the machine."""
+    """A work offset as the program sets it: its number, which one it is, and where it is in the machine."""
 
     number: int
     index: int
@@ -77,50 +77,46 @@ def work_offsets(words: BlockWords) -> WorkOffsets:
     result = np.array(base)
     stated: dict[tuple[float, ...], StatedOffset] = {}
     written: dict[int, Floats] = {}
+    lost = False  # what moves all offsets moves those too that are written later
     blocks = [block for block, _, _ in events]
     for (block, number, values), stop in zip(events, [*blocks[1:], n - 1], strict=True):
         changed[block + 1] |= number is None or number == base[block]
         if number is None:
-            written = _AllUnknown()
+            lost = True
         else:
-            before = written.get(number, np.full(4, np.nan))
-            written[number] = (
-                np.where(np.isnan(values), before, values) if values is not None else np.full(4, np.nan)
-            )
+            before = written.get(number, _NOWHERE)
+            written[number] = np.where(np.isnan(values), before, values) if values is not None else _NOWHERE
         rows = slice(block + 1, stop + 1)
         here = base[rows]
         for one in np.unique(here).tolist():
-            if one not in written and not isinstance(written, _AllUnknown):
-                continue
-            result[rows][here == one] = _stated(one, written.get(one, _NOWHERE), stated)
+            if one in written or lost:
+                values = _NOWHERE if lost else written[one]
+                result[rows][here == one] = _stated(one, values, stated)
     return WorkOffsets(result, changed[:n], tuple(stated.values()))
 
 
-class _AllUnknown(dict[int, Floats]):
-    """No offset is the cell's any longer."""
-
-
-_NOWHERE = np.full(4, np.nan)
+_NOWHERE = np.full(6, np.nan)
 MOST_STATED = 1000
 """Offsets that a program states; what more it writes is not known."""
 
 
 def _stated(number: int, values: Floats, stated: dict[tuple[float, ...], StatedOffset]) -> int:
-    """The number of a work offset with ``values`` (4,) X, Y, Z [m] and the angle [rad] about Z, -1 where unknown."""
+    """The number of a work offset with ``values`` (6,) X, Y, Z [m] and angles [rad] about Z, the new Y and the new X;
+    -1 where unknown."""
     if np.isnan(values).any() or number < 0:
         return -1
     same = (float(number), *values.tolist())
     if same not in stated:
         if len(stated) == MOST_STATED:
             return -1
-        pose = Poses(rotation_from_abc(np.array([values[3], 0.0, 0.0])), values[:3])
+        pose = Poses.from_abc(values[:3], values[3:])
         stated[same] = StatedOffset(number, len(stated), pose)
     return STATED + stated[same].index
 
 
 def _offset_events(words: BlockWords) -> list[tuple[int, int | None, Floats | None]]:
-    """Blocks that write an offset, its number or None for all, and its X, Y, Z [m] and angle [rad], NaN where they
-    stay; None where they are not known."""
+    """Blocks that write an offset, its number or None for all, and its X, Y, Z [m] and angles [rad] as of
+    ``_stated``, NaN where they stay; None where they are not known."""
     base, fanuc = words.modal.force[Group.OFFSET], words.control.increments
     events: list[tuple[int, int | None, Floats | None]] = []
     settings = np.flatnonzero(words.modal.has(Once.SETTING))
@@ -140,7 +136,7 @@ def _offset_events(words: BlockWords) -> list[tuple[int, int | None, Floats | No
         # An angle that no block states is that of the cell: none.
         turned = present[settings, 3].any()
         angle = np.where(present[:, 3] | fanuc | (not turned), np.nan_to_num(values[:, 3]), np.nan)
-        values = np.concatenate([values[:, :3], angle[:, None]], axis=1)
+        values = np.concatenate([values[:, :3], angle[:, None], np.zeros((len(words), 2))], axis=1)
         has = words.has(key("L"))
         for block in settings.tolist():
             kind, number = level[block], which[block]
@@ -164,9 +160,8 @@ def _offset_events(words: BlockWords) -> list[tuple[int, int | None, Floats | No
         assigned = note.kind == "assign" and _is_offset(note.text, fanuc)
         if assigned or (note.kind == "unknown" and note.text.startswith("#")):
             events.append((note.block, None, None))
-        if note.kind == "base" and (found := _WRITTEN_BASE.match(note.text)) is not None:
-            events.append((note.block, None if found[1] is None else int(found[1]), None))
-    return sorted(events, key=lambda event: event[0])
+    # of a block that writes one and one that selects it, the first comes first
+    return sorted([*events, *written_frames(words)], key=lambda event: (event[0], event[2] is not None))
 
 
 def _rewritten(words: BlockWords, used: Ints) -> Iterator[tuple[int, int | None]]:

@@ -43,6 +43,21 @@ class AxisWords:
 
 
 @dataclass(frozen=True, eq=False)
+class PolarTargets:
+    """Of B blocks: target (B, 3): axes of the plane that a block in polar coordinates moves; place (B, 3) [m]: where,
+    NaN where that is not known; read (B,): polar coordinates, or none, are in force, and which it is, is known."""
+
+    target: Bools
+    place: Floats
+    read: Bools
+
+    def part(self, start: int, stop: int) -> PolarTargets:
+        """The blocks start .. stop - 1."""
+        rows = slice(start, stop)
+        return PolarTargets(self.target[rows], self.place[rows], self.read[rows])
+
+
+@dataclass(frozen=True, eq=False)
 class Positions:
     """Of some blocks, start, end (B, 6) [m, rad]: programmed coordinates before and after every block, in its frame.
 

@@ -63,6 +63,7 @@ from postproc.languages.gcode.modal_fill import FilledRows, everywhere
 from postproc.languages.gcode.motions import GcodeMotions
 from postproc.languages.gcode.numbered import WorkOffsets, references, tool_lengths, tools, work_offsets
 from postproc.languages.gcode.orientation_words import OrientationWords
+from postproc.languages.gcode.polar_coordinates import polar_targets
 from postproc.languages.gcode.positions import Positions, Trace, stated_place
 from postproc.languages.gcode.program_passes import OTHERWISE_REPEATED, ProgramPass, differs_when_repeated
 from postproc.languages.gcode.reference_points import reference_angles
@@ -301,6 +302,7 @@ def _followed(
     lengths = tool_lengths(words, tool)
     ends = cycle_ends(words, events, lengths.changes | offset.changed)
     references_reached = reference_angles(words, settings.symbols)
+    polar = polar_targets(words)
     drills = drill_cycles(words, events, offset.changed, lengths.changes)
     found, differing = FilledRows(len(rows)), 0
     for start in range(0, max(len(words), 1), PART):
@@ -314,6 +316,7 @@ def _followed(
             ends.level[start:stop],
             lengths.changes[start:stop],
             references_reached[start:stop],
+            polar.part(start, stop),
             reasons,
         )
         where = trace.follow(way, start)

@@ -110,8 +110,8 @@ class RunFlow(RunCalls):
             self.variables.forget()
         return block + 1
 
-    def flow(self, statement: FlowStatement) -> int:
-        """Follows a statement about flow; where the run goes on.  Raises NotFollowed."""
+    def flow(self, statement: FlowStatement) -> int | None:
+        """Follows a statement about flow; where the run goes on, None where it ends.  Raises NotFollowed."""
         block, verb = statement.block, statement.verb
         around = self.shape.construct.get(block)
         if around is not None and block == around.start and block in self.opaque and verb != Verb.SUB:
@@ -275,7 +275,7 @@ class RunFlow(RunCalls):
             if statement.verb == Verb.REPEAT_PART:
                 raise NotFollowed
 
-    def jump(self, statement: FlowStatement) -> int:
+    def jump(self, statement: FlowStatement) -> int | None:
         """A jump whose condition is known.  Raises NotFollowed."""
         holds = self.value(statement.text, statement.block) if statement.text else 1.0
         if math.isnan(holds):
@@ -284,8 +284,8 @@ class RunFlow(RunCalls):
         if not holds:
             return statement.block + 1
         jump = self.computed(statement)
-        if jump.direction == "C" and self.labels.is_missing(jump, jump.block):
-            return statement.block + 1
+        if self.labels.is_missing(jump, jump.block):
+            return statement.block + 1 if jump.direction == "C" else None  # an alarm
         target = self.labels.find(jump, jump.block)
         if target is None:
             raise NotFollowed

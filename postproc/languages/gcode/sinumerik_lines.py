@@ -200,6 +200,8 @@ class _SinumerikLine(LineWords):
                     self.note("unknown", rest)
                 return len(text)
             close = assigned_end(text, assigned.end())
+            while text[close : close + 1] == b":":  # frames in a chain
+                close = assigned_end(text, close + 1)
             kind = (
                 "base"
                 if name.startswith(b"$P_UIFR")
