@@ -54,6 +54,7 @@ def codes(found: Program) -> list[str]:
         ("i=3\nIF i==2 THEN\nLIN {X 5}\nELSE\nLIN {X 6}\nENDIF\n", [6]),
         ("i=0\nREPEAT\nLIN {X i}\ni=i+1\nUNTIL(TRUE)\n", [0]),
         ("i=0\nREPEAT\ni=i+1\nLIN {X i}\nUNTIL(i>=2)\n", [1, 2]),
+        ("i=0\nREPEAT\ni=i+1\nIF i>2 THEN\nEXIT\nENDIF\nLIN {X i}\nUNTIL(FALSE)\n", [1, 2]),
         ("i=0\nWHILE(i<2)\ni=i+1\nLIN {X i}\nENDWHILE\n", [1, 2]),
         ("i=2\nSWITCH(i)\nCASE(2)\nLIN {X 5}\nDEFAULT\nLIN {X 6}\nENDSWITCH\n", [5]),
         ("i=2\nIF(i==2)THEN\nLIN {X 5}\nELSE\nLIN {X 6}\nENDIF\n", [5]),

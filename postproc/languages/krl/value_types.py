@@ -9,7 +9,7 @@ from types import MappingProxyType
 from postproc.base.byte_search import matches
 from postproc.base.document import Document
 from postproc.languages.krl.expressions import UntypedNumber, Value, decided_by_digits
-from postproc.languages.krl.lexing import NAME, POINT_TYPES, is_number
+from postproc.languages.krl.lexing import LONGEST, NAME, POINT_TYPES, is_number
 from postproc.languages.krl.target import AXES, COMPONENTS, EXTERNAL, UnknownValue, shown
 
 Structures = Mapping[bytes, Mapping[bytes, bytes]]
@@ -61,7 +61,7 @@ def _add(found: dict[bytes, Mapping[bytes, bytes]], name: bytes, components: Map
 
 def _declared_in(raw: bytes) -> Iterator[tuple[bytes, bool, dict[bytes, bytes]]]:
     """Name of each structure, whether it is GLOBAL, and its components."""
-    for found in matches(_STRUC, raw, (b"STRUC",)):
+    for found in matches(_STRUC, raw, (b"STRUC",), LONGEST):
         components: dict[bytes, bytes] = {}
         kind = b""
         for part in _SIZES.sub(b"", found[3]).upper().split(b","):
