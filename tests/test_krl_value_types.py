@@ -108,6 +108,21 @@ def test_a_structure_has_the_types_of_its_declaration(
         assert x(read(inside)) == found
 
 
+def test_a_counter_that_is_no_whole_number_is_not_followed() -> None:
+    body = "FOR n=1 TO 2\nLIN {X n/2}\nENDFOR\n"
+    assert x(read(source(f"DECL INT n\n{body}"))) == 1
+    assert x(read(source(f"DECL REAL n\n{body}"))) is None
+
+
+@pytest.mark.parametrize(("type_", "found"), [("INT", 1), ("REAL", 1.35), ("BOOL", None), ("", None)])
+def test_a_number_of_the_cell_has_the_type_of_its_name(type_: str, found: float | None) -> None:
+    config = f"DEFDAT $CONFIG\nDECL {type_} OFFSET\nENDDAT\n" if type_ else ""
+    document = Document(Path("part.src"), source("LIN {X OFFSET/2}\n").encode())
+    references = (Document(Path("$config.dat"), config.encode()),) * bool(config)
+    settings = ReadingSettings(references=references, symbols={"OFFSET": 2.7})
+    assert x(KrlDialect().read((document,), settings)) == found
+
+
 def test_of_a_component_whose_type_is_not_declared_a_whole_number_is_known() -> None:
     head = "DECL unknown_type d\n"
     assert x(read(source(f"{head}d.count=3\nLIN {{X d.count}}\n"))) == 3

@@ -299,10 +299,10 @@ def bind_symbols(declarations: Declarations, symbols: Mapping[str, Symbol], own:
             value: Value = parse(b"{" + text + b"}", 0, -1)
             if isinstance(value, KrlTarget):
                 value = value.detached()._replace(locked="its value is known to the controller only")
-        elif declarations.types.get(root) == b"INT":
-            value = int(symbol)
+        elif (kind := declarations.types.get(root)) in (b"INT", b"REAL"):
+            value = of_type(symbol, kind, key)
         else:
-            value = float(symbol) if declarations.types.get(root) == b"REAL" else UntypedNumber(symbol)
+            value = UntypedNumber(symbol)
         declarations.declared.add(key)
         declarations.shared.add(root)
         declarations.values.setdefault(root, {})[key[len(root) :]] = value
