@@ -156,3 +156,15 @@ def test_a_comment_on_the_first_line_of_a_routine_counts_in_it():
     forces = {1: "FORCE 1 0 0", 3: "FORCE 2 0 0", 2: "FORCE 2 0 0"}
     lines = {line: n for n in forces for line, words in enumerate(text.split("\n"), 1) if f"{{X {n}" in words}
     assert {lines[line]: force for line, force in read(text)[0]} == forces
+
+
+def test_a_jump_to_the_second_of_two_labels_does_not_pass_the_comment_of_the_first():
+    """Nor where the jump is followed, nor where it may be taken."""
+    for condition in ("i<2", "$IN[1]"):
+        text = (
+            f"{HEAD}DECL INT i\ni=0\na: ;FORCE 1 0 0\nb:\nLIN {{X 1,Y 2,Z 3,A 4,B 5,C 6}}\n;FORCE OFF\n"
+            f"i=i+1\nIF {condition} THEN\nGOTO b\nENDIF\n{LINE.format(2)}END\n"
+        )
+        rows, _ = read(text)
+        first, *others = [force for line, force in rows if line == 8]
+        assert [first, *others] == (["FORCE 1 0 0", "FORCE OFF"] if condition == "i<2" else ["?"])

@@ -13,6 +13,7 @@ from tiers import examples
 from postproc.base.document import Document
 from postproc.languages.dialect import Program
 from postproc.languages.krl import KrlDialect
+from postproc.toolpath import Toolpath
 
 HEAD = ["DEF part()", "BAS(#BASE,1)", "BAS(#TOOL,1)"]
 FULL = "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}"
@@ -122,6 +123,11 @@ def bases(body: list[str], pairs: dict[int, list[int]]) -> dict[int, set[int]]:
     return found
 
 
+def never_runs(path: Toolpath, row: int) -> bool:
+    found = path.constraints.refused.get(row)
+    return found is not None and found.code == "KRL023"
+
+
 @pytest.mark.slow
 @settings(deadline=None, max_examples=examples(300))
 @given(programs())
@@ -129,6 +135,7 @@ def test_a_base_that_is_known_is_that_of_every_way(body: list[str]) -> None:
     path, possible = read(body).toolpath, bases(body, blocks(body))
     for at, some in possible.items():
         rows = np.flatnonzero(path.line == at + 1 + len(HEAD))
+        assert not all(never_runs(path, row) for row in rows.tolist()), "\n".join(body)
         if (path.base[rows] >= 0).all():
             assert some <= {path.frames[path.base[row]].number for row in rows}, "\n".join(body)
 
@@ -162,3 +169,15 @@ def test_a_way_out_of_a_loop_that_is_given_up_starts_elsewhere() -> None:
     path = read(body).toolpath
     assert all(row < len(path) for rows in path.predecessors.values() for row in rows)
     assert not path.continues.any()
+
+
+@pytest.mark.parametrize(
+    "block",
+    [("IF $IN[1] THEN", "ENDIF"), ("IF $IN[1] THEN", "ELSE", "ENDIF"), ("WHILE $IN[1]", "ENDWHILE"),
+     ("FOR i=1 TO n", "ENDFOR"), ("REPEAT", "UNTIL $IN[1]"), ("SWITCH i", "CASE 1", "CASE 2", "ENDSWITCH")],
+)  # fmt: skip
+def test_what_a_jump_into_a_block_leads_to_may_run(block: tuple[str, ...]) -> None:
+    """A controller may refuse the program; where it does not, the motions at the label and behind the block run."""
+    *words, last = block
+    path = read(["GOTO a", *words, "a:", FULL, last, FULL]).toolpath
+    assert not any(never_runs(path, row) for row in range(len(path)))

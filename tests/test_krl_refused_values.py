@@ -27,3 +27,11 @@ def test_an_aggregate_within_another_one_is_named() -> None:
     found = messages("DECL S V", "V={F {X 1,Y 2,Z 3,A 0,B 0,C 180},N 4}", "$BASE=BASE_DATA[1]", "LIN V.F")
     assert any("within another one" in one for one in found)
     assert not any("braces" in one for one in found)
+
+
+def test_words_of_the_language_are_no_names_and_an_aggregate_is_not_called() -> None:
+    for word in ("ELSE", "ENDIF", "CASE", "UNTIL", "ENDFOR"):
+        assert any("is not understood" in one for one in messages(f"DECL INT {word}"))
+    aggregate = "{X 1,Y 2,Z 3,A 0,B 0,C 0}"
+    assert any("is not understood" in one for one in messages(f"F={aggregate}(2)"))
+    assert not any("is not understood" in one for one in messages(f"F={aggregate}", "DECL INT ELSES"))

@@ -13,6 +13,7 @@ from postproc.cell import frames_of
 from postproc.cell.read_cell import load_cell
 from postproc.languages.dialect import Program, ReadingSettings, read_with_siblings
 from postproc.languages.krl import KrlDialect
+from postproc.languages.krl.other_modules import MOST_DEPTH
 from postproc.toolpath.initial_state import Symbol
 
 FULL = "{X 1,Y 2,Z 3,A 4,B 5,C 6}"
@@ -352,3 +353,18 @@ def test_a_point_after_a_call_builds_on_where_the_other_module_ends(
     moves = "FALSE" not in module
     assert (1 in program.toolpath.constraints.refused) == moves
     assert (2 in program.toolpath.constraints.refused) == (second == "LIN")
+
+
+@pytest.mark.parametrize("deep", [1, MOST_DEPTH, MOST_DEPTH + 1, 150])
+def test_modules_that_call_each_other_are_followed_so_deep(deep: int) -> None:
+    """The last of a chain of modules sets the base; beyond the depth it is not known, whatever the chain's length."""
+    texts = [f"DEF m{n}()\nm{n + 1}()\nEND\n" for n in range(1, deep)] + [
+        f"DEF m{deep}()\nBAS(#BASE,2)\nEND\n"
+    ]
+    siblings = tuple(Document(Path(f"m{n}.src"), text.encode()) for n, text in enumerate(texts, 1))
+    source = Document(Path("part.src"), f"DEF part()\n{HEAD}LIN {FULL}\nm1()\nLIN {FULL}\nEND\n".encode())
+    path = KrlDialect().read((source,), ReadingSettings(siblings=siblings)).toolpath
+    if deep <= MOST_DEPTH:
+        assert path.frames[path.base[-1]].number == 2
+    else:
+        assert path.constraints.refused[len(path) - 1].code == "KRL005"

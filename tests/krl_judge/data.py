@@ -17,14 +17,17 @@ class Data(Operands):
 
     def dat(self) -> list[str]:
         rng = self.rng
-        out = [rng.choice(["DEFDAT part", "DEFDAT part PUBLIC"]), "STRUC jobtype FRAME P,INT count"]
+        out = [
+            rng.choice(["DEFDAT part", "DEFDAT part PUBLIC"]),
+            "STRUC jobtype FRAME P,INT count,REAL width",
+        ]
         for name, type_ in (("XP1", "E6POS"), ("XP2", "POS"), ("XP3", "FRAME")):
             out.append(f"DECL {type_} {name}={self.aggregate(plain=True)}")
         for name in MODULE_FRAMES:
             out.append(f"DECL FRAME {name}={self.aggregate(plain=True)}")
         out += [f"DECL INT {name}={rng.randint(0, 6)}" for name in MODULE_INTS]
         out += [f"DECL REAL {name}={self.number(0, 50)}" for name in MODULE_REALS]
-        out.append(f"DECL jobtype job={{P {self.aggregate(plain=True)},count 3}}")
+        out.append(f"DECL jobtype job={{P {self.aggregate(plain=True)},count 3,width {rng.randint(0, 9)}}}")
         out += self.further_data() if self.has_further else []
         out += ["DECL FRAME list[3]", *(f"list[{n}]={self.aggregate(plain=True)}" for n in (1, 2, 3))]
         for n in (1, 2):

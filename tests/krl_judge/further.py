@@ -33,7 +33,10 @@ class Further(Later):
         """Of the .dat, behind STRUC jobtype."""
         rng = self.rng
         out = ["ENUM colour red,green,blue", f"DECL colour shade={rng.choice(WORDS)}", "DECL jobtype jobs[2]"]
-        out += [f"jobs[{n}]={{P {self.aggregate(plain=True)},count {rng.randint(0, 4)}}}" for n in (1, 2)]
+        out += [
+            f"jobs[{n}]={{P {self.aggregate(plain=True)},count {rng.randint(0, 4)},width {rng.randint(0, 9)}}}"
+            for n in (1, 2)
+        ]
         out.append("DECL FRAME grid[2,2]")
         out += [f"grid[{m},{n}]={self.aggregate(plain=True)}" for m in (1, 2) for n in (1, 2)]
         axes = ",".join(f"A{k} {self.number(-80, 80)}" for k in range(1, 7))
@@ -84,11 +87,15 @@ class Further(Later):
 
     def record(self, depth: int) -> list[str]:
         rng, n = self.rng, self._index()
+        plain = self.aggregate("YZABC", plain=True)[1:]
         return rng.choice(
             [
                 [f"jobs[{n}].P.{rng.choice('XYZA')}={self.real()}"],
                 [f"jobs[{n}].P={self.frame_value()}", f"LIN jobs[{rng.randint(1, 2)}].P"],
                 [f"jobs[{n}].count={self.whole()}", f"{rng.choice(self.names.ints)}=jobs[1].count"],
+                [f"jobs[{n}].count={self.real()}", f"{rng.choice(self.names.ints)}=jobs[{n}].count/2"],
+                [f"job.width={rng.randint(0, 9)}", f"LIN {{X job.width/2,{plain}"],
+                [f"LIN {{X {rng.choice(['mr', 'jobs[2].width', 'job.width'])}/2,{plain}"],
                 [f"LIN jobs[{n}].P{rng.choice(['', ' C_DIS'])}"],
                 ["job=jobs[1]", "LIN job.P"],
                 [f"jobs[{n}]=job", "LIN jobs[2].P"],

@@ -73,7 +73,7 @@ class Operands:
             return f"{rng.choice(names.frames)}.{rng.choice('XYZABC')}"
         one, other = self.real(depth + 1), self.real(depth + 1)
         return rng.choice(
-            [f"{one}+{other}", f"({one}-{other})", f"{one}*{rng.choice(['2', '0.5', '1.25'])}", f"{one}/4.",
+            [f"{one}+{other}", f"({one}-{other})", f"{one}*{rng.choice(['2', '0.5', '1.25'])}", f"{one}/4.", f"{one}/3",
              f"SIN({one})", f"COS({one})*10", f"SQRT(ABS({one}))", f"ATAN2({one},1.5)", f"-{one}", f"({one})"]
         )  # fmt: skip
 

@@ -9,7 +9,7 @@ from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.expressions import Value, index_text
 from postproc.languages.krl.external_axes import apart
 from postproc.languages.krl.lexing import (
-    SCALARS,
+    POINT_TYPES,
     Assignment,
     Declared,
     Statement,
@@ -403,16 +403,14 @@ def _set_variable(run: ExecutionContext, assignment: Assignment) -> None:
 
 def _may_be_point(run: ExecutionContext, name: bytes, path: bytes) -> bool:
     """Whether ``.X`` of this is a component of a point, and not a field of a structure that is called so."""
-    return b"." in path or run.type_of(name) not in SCALARS
+    kind = run.type_at(name, path)
+    return not kind or kind in POINT_TYPES
 
 
 def keep(run: ExecutionContext, name: bytes, path: bytes, value: Value) -> None:
     """Stores a value; a number only where no other program can change it."""
     if not isinstance(value, (KrlTarget, UnknownValue)):
-        if not run.trusted(name):
-            value = _untrusted(name)
-        else:
-            value = run.converted(name, value) if not path.startswith(b".") else value
+        value = run.converted(name, value, path) if run.trusted(name) else _untrusted(name)
     run.variables.set(name, path, value)
 
 

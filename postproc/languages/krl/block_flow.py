@@ -201,6 +201,8 @@ class BlockFlow(OpenBlocks):
         if bounds is None:
             return None
         name, (first, last, step) = bounds
+        if run.type_of(name) == b"REAL":
+            return None  # a counter is an INT
         if not (isinstance(first, int) and isinstance(last, int) and isinstance(step, int) and step):
             return None
         if ((last - first) // step) * (block.end - block.start) > BUDGET - self.spent:

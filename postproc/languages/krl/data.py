@@ -32,6 +32,14 @@ from postproc.languages.krl.target import (
     parse,
     shown,
 )
+from postproc.languages.krl.value_types import (
+    PREDEFINED,
+    Structures,
+    component_type,
+    of_component,
+    of_type,
+    structures_of,
+)
 from postproc.languages.krl.variables import Entry
 from postproc.toolpath.initial_state import Symbol
 
@@ -49,7 +57,7 @@ class Declarations:
     a point with its index -> its declaration's line, where another one can be after; shared: names that other
     programs know too; origin: what only another file declares -> that file; frames: entries of
     BASE_DATA and TOOL_DATA in the controller's own files -> X..C [mm, deg], and the file; loads: number of a tool ->
-    mass [kg] and centre [m] there.
+    mass [kg] and centre [m] there; structures: the types of their components.
     """
 
     values: dict[bytes, Entry] = field(default_factory=dict)
@@ -61,6 +69,7 @@ class Declarations:
     origin: dict[bytes, str] = field(default_factory=dict)
     frames: dict[str, tuple[Numbers, str]] = field(default_factory=dict)
     loads: dict[int, tuple[float, float, float, float]] = field(default_factory=dict)
+    structures: Structures = field(default_factory=lambda: PREDEFINED)
 
 
 def read_references(result: Declarations, documents: Iterable[Document]) -> None:
@@ -68,7 +77,7 @@ def read_references(result: Declarations, documents: Iterable[Document]) -> None
     own = frozenset([*result.types, *map(_root, result.records)])
     found: dict[bytes, _Declaration] = {}
     for document in documents:
-        one = Declarations()
+        one = Declarations(structures=structures_of([document], known=result.structures))
         read_data(one, document, -1)
         for root, declaration in _by_root(one, document.path.name).items():
             before = found.setdefault(root, declaration)
@@ -143,7 +152,9 @@ def read_data(result: Declarations, document: Document, file: int) -> None:
                 elif result.types.get(root, b"FRAME") in POINT_TYPES:
                     _add(result, key, read_point(said.value.rstrip(), said.at, file, line), span, foreign)
             elif key is not None and not foreign and result.types.get(_root(key)) in SCALARS:
-                _add(result, key, _constant(said.value.rstrip()), span, foreign)
+                _add(
+                    result, key, _constant(said.value.rstrip(), result.types[_root(key)], key), span, foreign
+                )
 
 
 def _declare(
@@ -151,7 +162,7 @@ def _declare(
     in_other_file: bool,
 ) -> None:  # fmt: skip
     root = _root(key)
-    result.types[root] = declaration.type
+    kind = result.types[root] = declaration.type
     if declaration.is_global or in_other_file:
         result.shared.add(root)
     if root in FRAME_TABLES:
@@ -172,7 +183,7 @@ def _declare(
         and declaration.type in SCALARS
         and (declaration.is_constant or _keeps_number(root, declaration, in_other_file))
     ):
-        _add(result, key, _constant(value), span, in_other_file)
+        _add(result, key, _constant(value, kind, key), span, in_other_file)
 
 
 def _keeps_number(root: bytes, declaration: Declared, in_other_file: bool) -> bool:
@@ -186,11 +197,12 @@ def _members(result: Declarations, root: bytes, path: bytes, value: bytes, line:
         return
     for key, text in fields(value).items():
         name = path + b"." + key
+        kind = component_type(result.types[root], name, result.structures)
         if not (text.startswith(b"{") and text.endswith(b"}")):
-            constant = _constant(text)
+            constant = of_component(evaluate(text, _no_variable), kind, root + name)
             if not isinstance(constant, UnknownValue):
                 result.values.setdefault(root, {}).setdefault(name, constant)
-        elif b"{" not in text[1:] and identifiers(text) <= _POINT_KEYS:
+        elif (not kind or kind in POINT_TYPES) and b"{" not in text[1:] and identifiers(text) <= _POINT_KEYS:
             point = read_point(text, 0, -1, line)
             if isinstance(point, KrlTarget):
                 point = point._replace(locked="")
@@ -199,8 +211,12 @@ def _members(result: Declarations, root: bytes, path: bytes, value: bytes, line:
             _members(result, root, name, text, line, depth + 1)
 
 
-def _constant(text: bytes) -> Value:
-    return evaluate(text, lambda name, path: None)
+def _no_variable(name: bytes, path: bytes) -> None:
+    """Nothing: constants are made of digits alone."""
+
+
+def _constant(text: bytes, kind: bytes, name: bytes) -> Value:
+    return of_type(evaluate(text, _no_variable), kind, name)
 
 
 def _add(result: Declarations, key: bytes, value: Value, span: Span, in_other_file: bool) -> None:
@@ -283,10 +299,10 @@ def bind_symbols(declarations: Declarations, symbols: Mapping[str, Symbol], own:
             value: Value = parse(b"{" + text + b"}", 0, -1)
             if isinstance(value, KrlTarget):
                 value = value.detached()._replace(locked="its value is known to the controller only")
-        elif declarations.types.get(root) == b"INT":
-            value = int(symbol)
+        elif (kind := declarations.types.get(root)) in (b"INT", b"REAL"):
+            value = of_type(symbol, kind, key)
         else:
-            value = float(symbol) if declarations.types.get(root) == b"REAL" else UntypedNumber(symbol)
+            value = UntypedNumber(symbol)
         declarations.declared.add(key)
         declarations.shared.add(root)
         declarations.values.setdefault(root, {})[key[len(root) :]] = value

@@ -13,7 +13,7 @@ from postproc.base.findings import Finding
 from postproc.languages.core.motion_sources import together
 from postproc.languages.core.waits import Waits
 from postproc.languages.krl.data import Declarations
-from postproc.languages.krl.expressions import Value, decided_by_digits, evaluate
+from postproc.languages.krl.expressions import Value, evaluate
 from postproc.languages.krl.lexing import FRAME_TABLES, Statement
 from postproc.languages.krl.modal_state import (
     OVERRIDES,
@@ -30,6 +30,7 @@ from postproc.languages.krl.program_structure import ProgramStructure
 from postproc.languages.krl.spatial import ZERO
 from postproc.languages.krl.statement_effects import COMMENTS, Effect, Effects
 from postproc.languages.krl.target import COMPONENTS, FrameEntry, KrlTarget, UnknownValue, known, shown
+from postproc.languages.krl.value_types import component_type, of_component, of_type
 from postproc.languages.krl.variables import VariableFacts, Variables
 from postproc.languages.krl.vectorised import Item
 
@@ -245,21 +246,14 @@ class ExecutionContext:
             return True
         return name in self.declarations.types and name not in self.declarations.shared
 
-    def converted(self, name: bytes, value: Value) -> Value:
-        """The value as a variable of its type holds it; a number is no BOOL, and a BOOL no number."""
-        kind = self.type_of(name)
-        if not isinstance(value, (int, float)) or kind not in (b"INT", b"REAL", b"BOOL"):
-            return value
-        if isinstance(value, bool) != (kind == b"BOOL"):
-            return UnknownValue(
-                "KRL002", f"{shown(name)} has the type {shown(kind)} and gets a value of another type"
-            )
-        if kind == b"INT":
-            if (halves := round(2.0 * value)) % 2 and decided_by_digits(2.0 * value, float(halves)):
-                why = f"{shown(name)} is a whole number, and the last digits of a REAL decide which one"
-                return UnknownValue("KRL002", why)
-            return int(value + 0.5) if value >= 0 else -int(0.5 - value)
-        return float(value) if kind == b"REAL" else value
+    def type_at(self, name: bytes, path: bytes) -> bytes:
+        """The type of ``name path``, b"" where it is not declared."""
+        return component_type(self.type_of(name), path, self.declarations.structures)
+
+    def converted(self, name: bytes, value: Value, path: bytes = b"") -> Value:
+        """The value as ``name path`` holds it by its type."""
+        convert = of_component if b"." in path else of_type
+        return convert(value, self.type_at(name, path), name + path)
 
     def flow(self) -> Flow:
         """What holds here."""

@@ -34,6 +34,7 @@ from postproc.languages.krl.program_structure import ProgramStructure, program_s
 from postproc.languages.krl.scan import scan
 from postproc.languages.krl.target import shown
 from postproc.languages.krl.to_toolpath import to_toolpath
+from postproc.languages.krl.value_types import structures_of
 from postproc.languages.krl.variables import Variables
 from postproc.languages.krl.vectorised import Item
 from postproc.toolpath import FrameRef, Kind, Toolpath
@@ -77,11 +78,11 @@ def read(
     """
     source = documents[0]
     code = list(scan(source, fast))
-    declarations = Declarations()
+    data = [*references, *(one for one in siblings if not is_module(one))]
+    declarations = Declarations(structures=structures_of(documents, data))
     for file, document in enumerate(documents[1:], 1):
         read_data(declarations, document, file)
     own = frozenset([*declarations.declared, *declarations.records])
-    data = [*references, *(one for one in siblings if not is_module(one))]
     read_references(declarations, data)
     bind_symbols(declarations, symbols, own)
     declarations.frames, declarations.loads = declared_frames(data), declared_loads(data)

@@ -30,6 +30,7 @@ from postproc.languages.krl.routine_calls import closure
 from postproc.languages.krl.scan import scan
 from postproc.languages.krl.statement_effects import Effect, Effects, is_harmless, returned_to
 from postproc.languages.krl.target import UnknownValue
+from postproc.languages.krl.value_types import structures_of
 from postproc.languages.krl.variables import Variables
 from postproc.languages.krl.vectorised import Item
 from postproc.toolpath.initial_state import Symbol
@@ -202,11 +203,13 @@ def _module(
     references: Sequence[Document],
     symbols: Mapping[str, Symbol],
 ) -> OtherModule:
-    declarations = Declarations()
-    if data is not None:
-        read_data(declarations, data, 1)
+    own_data = [] if data is None else [data]
+    shared = [one for one in references if one is not data]
+    declarations = Declarations(structures=structures_of([document, *own_data], shared))
+    for one in own_data:
+        read_data(declarations, one, 1)
     own = frozenset([*declarations.declared, *declarations.records])
-    read_references(declarations, [one for one in references if one is not data])
+    read_references(declarations, shared)
     bind_symbols(declarations, symbols, own)
     code = list(scan(document, True))
     statements = ((i, one if isinstance(one, Statement) else _MOTION) for i, one in enumerate(code))

@@ -114,7 +114,7 @@ class ProgramFlow(Calls):
             run.variables.replace(name, {} if value is None else {b"": run.converted(name, value)})
         self._comment_after(self._item(routine.start))
         pc: int | None = routine.start + 1
-        while pc is not None and pc < len(run.code):
+        while pc is not None:  # it has an END: else it is not followed
             pc = self._step(pc)
         return run.merged(self.activations[-1].returned, self._here())
 
@@ -279,7 +279,7 @@ class ProgramFlow(Calls):
             self._comment_after(item)
         elif kind == StatementKind.GOTO and isinstance(said, bytes):
             there = self._goto(pc, said)
-            if 0 < there <= pc:
+            if there <= pc:
                 before = run.code[there - 1]
                 if (
                     isinstance(before, Statement)

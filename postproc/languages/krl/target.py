@@ -138,7 +138,7 @@ class KrlTarget(NamedTuple):
             value = self.axes[AXES[key]]
         elif key in _STATES:
             bits = self.status if key == b"S" else self.turn
-            value = float(bits) if bits >= 0 else None
+            value = bits if bits >= 0 else None
         else:
             value = next((v for name, v, _ in self.external if name == key), None)
         return None if value is None or value != value else value

@@ -47,8 +47,6 @@ class Variables:
         self._paths = KeyNumbers()
         self._parts: dict[bytes, list[bytes]] = {}
         self._nothing = PersistentMap(self._paths)
-        self._paths.of(b"")  # the whole is number 0
-        self._no_parts = self._nothing.root[1:]
         self.facts = VariableFacts(PersistentMap(KeyNumbers()), None)
 
     def get(self, name: bytes, path: bytes = b"") -> Value | None:
@@ -59,7 +57,7 @@ class Variables:
     def set(self, name: bytes, path: bytes, value: Value) -> None:
         if not path:
             # The value of the whole takes the place of all of its parts.
-            self._put(name, PersistentMap(self._paths, (Fact(value, self.line), *self._no_parts)))
+            self._put(name, self._nothing.set(b"", Fact(value, self.line)))
             return
         entry = self.facts.names.get(name)
         if entry is None:
@@ -141,7 +139,7 @@ class Variables:
                 self.mixed.add(name)
                 return Fact(b.value, b.line)
             if _same(a.value, b.value):
-                return own if own is not None else a
+                return a
             if isinstance(a.value, KrlTarget) and isinstance(b.value, KrlTarget):
                 one, two = a.value.detached(), b.value.detached()
                 if one == two:
