@@ -105,6 +105,7 @@ def repeated(path: Toolpath, times: int) -> Toolpath:
             "inverse_time_feed",
             "spindle",
             "stops",
+            "waits",
         )
     }
     return path.with_columns(
