@@ -55,7 +55,8 @@ def waits_gcode(between: str, dialect=FANUC) -> list[bool]:
         (waits_tp, "R[1]=2\n", False),
         (waits_gcode, "G4 P2000\n", True),
         (waits_gcode, "M0\n", True),
-        (waits_gcode, "T2 M6\n", True),
+        (waits_gcode, "T2\n", True),
+        (waits_gcode, "M6\n", True),
         (waits_gcode, "M8\n", False),
     ],
 )
