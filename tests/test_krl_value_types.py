@@ -153,3 +153,9 @@ def test_a_component_called_as_one_of_a_point_is_none_in_a_structure() -> None:
         assert x(read(source(f"{place}=2.7\nLIN {{X {place}/2,Y {place}}}\n"), dat)) == 1
     path = read(source("d.X=2.7\nLIN {X d.X}\n"), dat).toolpath
     assert np.isclose(path.position[-1, 0] / MM, 3)
+
+
+@pytest.mark.parametrize(("component", "half"), [("S", 3), ("T", 3), ("X", 3.5), ("C", 3.5)])
+def test_status_and_turn_of_a_point_are_whole_numbers(component: str, half: float) -> None:
+    body = f"DECL POS p\n{FULL}p={{X 1,Y 2,Z 3,A 4,B 5,C 6,S 2,T 2}}\np.{component}=7\nLIN {{X p.{component}/2}}\n"
+    assert x(read(source(body))) == half
